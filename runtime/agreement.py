@@ -8,7 +8,7 @@ standard deviations,
 
 s_k is the corrected standard deviation. The deviation is multiplied by the root of a factor c if
 residuals stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A
-parameter differs if |d| exceeds DIFFERS. This limit is a convention, not a statistical test
+parameter differs if |d| exceeds 3 (`DIFFERS`). This limit is a convention, not a statistical test
 (benchmarks/truth.md). Differences up to 10 % of the value (RELEVANT_DIFFERENCE in limits.toml) do
 not change the verdict.
 

@@ -6,8 +6,9 @@ torques are linear in X and depend on b through the motion of the base. By Gauss
     Y = W(b) X + S db + rho,    S = d(W X)/db,    b <- b + db ,
 
 with each joint weighed by its residual. W is of second degree in b_w and of first in b_f, so that
-central differences of W X are exact. One set of biases holds for all records. A prior of deviation
-PRIOR about the start, wider than the bias of any sensor, keeps a bias that the records do not show.
+central differences of W X are exact. One set of biases holds for all records. A prior about the
+start keeps a bias that the records do not show; its deviations (`PRIOR`) are wider than the bias of
+any sensor.
 
 The deviations of b are those of the linear problem [W S], with blocks of time as independent. The
 deviations of X grow by what these deviations of b move: X(b) has the derivative -W^+ S.

@@ -7,8 +7,8 @@
     EXTRAS     Identification -> Part: further analyses of the records
     QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
-Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
-function of the package. A feature is one file and one line of a list.
+Each call builds a Problem from model, records and study, prepares it by the steps in `STEPS` and
+passes it to one function of the package. A feature is one file and one line of a list.
 """
 
 from __future__ import annotations
@@ -242,7 +242,7 @@ ARGUMENTS: dict[str, tuple[tuple[type, ...], str]] = {
 def entry(function: Callable[P, R]) -> Callable[P, R]:
     """Wrap a public function: its arguments are checked, and it runs with one BLAS thread.
 
-    InputError, in one sentence, for an argument of another type than in `ARGUMENTS`.
+    Raises InputError for an argument of another type than the table `ARGUMENTS` states.
     """
 
     @wraps(function)
@@ -361,7 +361,7 @@ def problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """Build a Problem from model, records and study, and apply every preparation step of `STEPS`.
+    """Build a Problem from model, records and study, and apply every preparation step.
 
     Parameters
     ----------
@@ -694,7 +694,8 @@ def assess(
 ) -> Identification:
     """Identify a robot and make every further analysis that the data allow (`symgen report`).
 
-    The analyses of EXTRAS are made as far as records, study and installed packages allow.
+    The analyses of the list `EXTRAS` are made as far as records, study and installed packages
+    allow.
 
     encoder : steps of the encoders in use, rad or m.
     progress : called with the name of each part before the part is computed.

@@ -8,7 +8,7 @@ torque errors of motions within the range of the robot.
     C       covariance S C_10 S of least squares with joints weighted by their residuals: C_10 of
             eq. (10), and S the diagonal matrix of corrected over stated standard deviations, times
             a factor for correlations longer than a block
-    V       the same, if the fit uses the values of the robot file, known to VALUES_KNOWN:
+    V       the same, if the fit uses the values of the robot file, known to 30 %:
             (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
             of the standard parameters is then chi_V
     a       share of the accelerations that is an error of the encoder's steps
@@ -27,11 +27,11 @@ fourth term is what the model lacks; the first two terms are then multiplied by 
 that the laws leave. Other effects that the model lacks are included only as far as they are in the
 residuals of C.
 
-The squared error of one record is a sum of b squares, a few of which are large: with
-M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
-interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times STEPS_MOVE, the fourth times LAWS_MOVE. If one direction is undetermined, nu is 1;
-an expected error of 30 % may then be an error of 2 %.
+The squared error of one record is a sum of b squares, a few of which are large: with M = K'D'D K V
+it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The interval of the
+expected error has the first two terms times quantiles of this distribution, the third times two
+factors (`STEPS_MOVE`), and the fourth times two others (`LAWS_MOVE`). If one direction is
+undetermined, nu is 1; an expected error of 30 % may then be an error of 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """

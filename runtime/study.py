@@ -291,7 +291,7 @@ def _beyond_limits(
     """Report positions that are impossible in rad, because they are in degrees or on the motor
     side.
 
-    The positions of every joint exceed the limits of the robot file more than `BEYOND` times;
+    The report is made if the positions of every joint exceed twice the limits of the robot file;
     otherwise, the text is "".
     """
     limits = getattr(model, "LIMITS", {}).get("q", ())

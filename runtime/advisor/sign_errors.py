@@ -120,9 +120,9 @@ def switch_with_error(
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
     """Compute the Hermite coefficients of a column of W that switches sign, such as sign(qd).
 
-    Return c_n/sqrt(n!) of order n = 1 ... ORDERS and one more row, shape (ORDERS + 1, len(u)). This
-    row is for all higher orders: the square root of the variance they contribute, with the sign of
-    the next coefficient.
+    Return c_n/sqrt(n!) of the orders n = 1 ... N and one more row, shape (N + 1, len(u)), with N =
+    `ORDERS`. The last row is for all higher orders: the square root of the variance they
+    contribute, with the sign of the next coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):
@@ -146,8 +146,8 @@ class Kernels:
     They are those of rho_k^n r_k, with rho_k the correlation of velocity errors k samples apart,
     and r_k the same for the decimation filter.
 
-    spectra : transforms for n = 1 ... ORDERS + 1, shape (ORDERS + 1, length//2 + 1). Frequencies
-        between 0 and the Nyquist frequency count twice.
+    spectra : transforms for n = 1 ... N + 1 with N = `ORDERS`, shape (N + 1, length//2 + 1).
+        Frequencies between 0 and the Nyquist frequency count twice.
     bin, bins, length : there are `bins` sums of `bin` samples each, padded with zeros to `length`.
     """
 
@@ -184,7 +184,8 @@ def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
     It is the sum of c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's
     theorem.
 
-    coefficients : c_n/sqrt(n!) at the samples `near`, shape (ORDERS + 1, len(near)).
+    coefficients : c_n/sqrt(n!) at the samples `near`, of N = `ORDERS` orders and one more,
+        shape (N + 1, len(near)).
     """
     sums = np.array(
         [np.bincount(near // known.bin, weights=c, minlength=known.bins) for c in coefficients]

@@ -126,7 +126,7 @@ class FittedLaw(Part):
         self.estimate = estimate
 
     def checks(self) -> tuple[Check, ...]:
-        """Return one check, which is good: the fitted gains and the fitted delay."""
+        """Return one check, always good, whose text gives the fitted gains and the fitted delay."""
         finding = self.estimate.text.rstrip(".")
         question = "What was fitted of the law of the controller?"
         return (Check(question, "good", finding, ahead=True),)
@@ -196,8 +196,8 @@ def doubt_of_gains(result: Identification) -> Doubt | None:
 def gain_doubt(problem: Problem, error: float) -> str:
     """Write a warning if the records fit much better with other velocity gains kd than the given.
 
-    The warning is written if another kd more than halves the error. Otherwise the text is "", also
-    if the records do not use the torque of the law.
+    The warning is written if another kd more than halves the error. Otherwise the text is "". It is
+    "" as well if the torques of the records do not come from the control law.
 
     error : relative error of the torque with the stated kd, %.
     """

@@ -360,8 +360,9 @@ def is_axis(joint: int | str) -> bool:
 def is_form(acts: Mapping[Any, float]) -> bool:
     """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
 
-    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
-    joint or, of a quadratic form, by pair of joints.
+    Other elements act along a combination s = G q of joints.
+
+    acts : coefficients of the element, one for each joint or, for a form, for each pair of joints.
     """
     return any(isinstance(key, tuple) for key in acts)
 
@@ -540,7 +541,7 @@ class BoundModel:
     model : GeneratedModel
         An emitted module.
     constants : mapping of str to float
-        New values of some of its CONSTANTS, by name.
+        New values of some constants of the module, by name.
     """
 
     def __init__(self, model: GeneratedModel, constants: Mapping[str, float]) -> None:

@@ -378,7 +378,7 @@ def validated(
 
 
 def _errors(validation: Sequence[CrossValidation]) -> dict[SetName, float]:
-    """Return the error of each set on the last data that it predicts, %, in the order of ORDER."""
+    """Return the error of each set (essential, feasible, all) on the last data it predicts, %."""
     errors = validation[-1].errors() if validation else {}
     return {name: errors[name] for name in ORDER if name in errors}
 

@@ -187,7 +187,7 @@ class Boxes:
     def agrees(self, read: Posterior) -> bool:
         """Whether the estimation has converged and the motion agrees with every count.
 
-        A distance of FAR standard deviations from an interval is allowed.
+        A distance of six standard deviations from an interval is allowed (`FAR`).
         """
         x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
         e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
@@ -199,7 +199,7 @@ class Boxes:
         """Find the samples at which the counts may jump, for instance because counts were lost.
 
         The result is the sample with the largest density of the jerk, and the middles of the
-        SUSPECTS windows of time whose counts the other windows predict worst.
+        windows of time whose counts the other windows predict worst (`SUSPECTS` windows).
         """
         m, v, speed = read.without
         off = (m - (self.low + self.high) / 2) ** 2 / (v + read.errors.variance(speed) + 1 / 12)
@@ -211,8 +211,8 @@ class Boxes:
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
         """Estimate the motion again, only from the samples near the sample `middle`.
 
-        On either side, BESIDE samples are used. Returns the first sample of this part, its bounds
-        and its motion.
+        The samples near it are those up to `BESIDE` samples away. Returns the first sample of this
+        part, its bounds and its motion.
         """
         m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
         first = max(0, middle - BESIDE) // m
@@ -279,8 +279,9 @@ def of_most_evidence(
 ) -> Posterior:
     """Find the most likely size of count and time-stamp errors, and estimate the motion with it.
 
-    The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
-    at a time, in the directions `moves`, as long as the evidence clearly rises.
+    The search starts from `start` and changes the errors by one element of `sizes` or of the clock
+    errors (`CLOCK_ERRORS`) at a time, in the directions `moves`, as long as the evidence clearly
+    rises.
     """
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
@@ -319,8 +320,8 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
     """Estimate the spectral density of the jerk around each of the M intervals of the spline.
 
-    The estimate follows MacKay's rule. In every window, the whole record counts as much as
-    OF_RECORD determined jerks.
+    The estimate follows MacKay's rule. In every window, the whole record counts as much as a fixed
+    number of determined jerks (`OF_RECORD`).
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,

@@ -2,7 +2,7 @@
 
 A position used as measured has an error of variance step^2/12. Through the filters of the study it
 becomes an error of qdd of variance v. The columns of W are then too small by about v divided by the
-mean square of qdd. If this share is large enough (HELPS), the bias justifies `reader: counts`.
+mean square of qdd. If this share is above 1 % (`HELPS`), the bias justifies `reader: counts`.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
     reading = read_counts(position, rate, step)        encoder side, shape (N, n)
     reading.q, reading.s_q, reading.findings
 
-The theory is in docs/theory/counts.md. Records longer than STRETCH samples are processed in
-stretches that overlap by MARGIN samples on either side, so that memory and time are proportional to
-the length of the record. A missing sample follows from its neighbours by the posterior. In a gap in
-which the posterior does not determine the position to half a step, the state is unknown.
+The theory is in docs/theory/counts.md. Long records are processed in stretches (of `STRETCH`
+samples) that overlap on either side (by `MARGIN` samples), so that memory and time are proportional
+to the length of the record. A missing sample follows from its neighbours by the posterior. In a gap
+in which the posterior does not determine the position to half a step, the state is unknown.
 """
 
 from __future__ import annotations

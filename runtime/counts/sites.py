@@ -197,7 +197,9 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
+        """Extract the consecutive samples (at most `LIVELIEST`) in which the count changes most
+        often.
+        """
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -209,8 +211,8 @@ class Counts:
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
         """Estimate the motion, and the sizes of the count errors that make the counts most likely.
 
-        The smallest errors are used unless the evidence of larger errors is UNEVEN nats higher. If
-        the errors of the counts are large, errors of the clock are tried too.
+        The smallest errors are used unless the evidence of larger errors is at least 40 nats higher
+        (`UNEVEN`). If the errors of the counts are large, errors of the clock are tried too.
         """
         wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
         boxes, read = self.first(Errors(wide))
@@ -275,7 +277,7 @@ class Counts:
 
         Returns, for every sample, the precision and its product with the mean. The two samples
         around a change have the most precision; other samples have little, missing samples `rest`.
-        A change across a gap longer than KNOTS is not used.
+        A change across a long gap (more than `KNOTS`) is not used.
         """
         y, known, near = self.y, self.measured, max(1, round(KNOTS / self.Ts))
         tau = self.rest.copy()
@@ -305,8 +307,8 @@ class Counts:
     def leaps(self) -> list[tuple[int, int]]:
         """Find single changes of the count that are too large for a smooth motion of the encoder.
 
-        Returns the sample and the number of counts of each change. Such a change differs from the
-        parabola through its neighbours more than LEAP times as much as the neighbours do.
+        Returns the sample and the number of counts of each change. Such a change differs much more
+        (`LEAP` times) from the parabola through its neighbours than the neighbours do.
         """
         y, known = self.y, self.measured
         change = np.diff(y[known])
@@ -324,9 +326,10 @@ class Counts:
     def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
         """Find a jump of the counts that a smooth motion does not explain, such as lost counts.
 
-        Returns the sample and the number of counts, or None. Without the jump the record around it
-        must be more likely by LIKELIER nats. No search is made if the errors of the counts have
-        their smallest value and the jerk has no peak above SPIKE times its mean density.
+        Returns the sample and the number of counts, or None. Without the jump, the record around it
+        must be clearly more likely (by `LIKELIER` nats). No search is made if the errors of the
+        counts have their smallest value and the jerk has no high peak (above `SPIKE` times its mean
+        density).
         """
         spikes = read.density.max() > SPIKE * read.density.mean()
         if len(boxes.sites) < FEWEST or not (spikes or read.errors.count > COUNT_ERRORS[0]):
@@ -374,7 +377,7 @@ def _spline_through_sites(
     """Fit a spline to positions with Gaussian errors, and estimate the density of its white jerk.
 
     Returns the coefficients and the density, shape (M,), which starts from `density` and is updated
-    at most FIRST times.
+    a few times (at most `FIRST`).
     """
     tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
     samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)

@@ -5,8 +5,9 @@ rows of poses that were recorded already, if there are any. The search finds
 
     max log det M,  M = W0'W0 + W'W        C = M^-1, the predicted covariance
 
-by exchange: each pose in turn is replaced by that of CANDIDATES random poses which enlarges the
-determinant most, until no exchange enlarges it. The result is the best of several random starts.
+by exchange: each pose in turn is replaced by that of many random poses (`CANDIDATES`) which
+enlarges the determinant most, until no exchange enlarges it. The result is the best of several
+random starts.
 
 References: Fedorov (1972), Theory of Optimal Experiments; Atkinson, Donev and Tobias (2007).
 """
@@ -213,8 +214,8 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 def _quality(M: Array) -> tuple[float, Array]:
     """Compute the condition number of W and the standard deviations of the parameters from M = W'W.
 
-    The standard deviations have shape (c,). All results are infinite if the condition number is
-    LARGEST_CONDITION or more: then W does not determine the parameters.
+    The standard deviations have shape (c,). All results are infinite if the condition number is 1e4
+    or more (`LARGEST_CONDITION`): then W does not determine the parameters.
     """
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

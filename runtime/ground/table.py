@@ -119,7 +119,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Pad cells of text to equal width, and join them into lines of at most LINE characters."""
+    """Pad cells of text to equal width, and join them into lines of at most 80 characters."""
     width = max(map(len, cells), default=0) + 2
     many = max((LINE + 2) // width, 1)
     rows = [cells[k : k + many] for k in range(0, len(cells), many)]

@@ -197,8 +197,8 @@ class Loop:
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
         """Simulate a record with `simulator`, and make the closed loop of this record.
 
-        The closed loop itself is simulated with the encoder of the settings. The reader gets the
-        step; without any step, the positions are exact.
+        The simulated controller sees the encoder of the settings. The identification reads the
+        positions with the encoder step of the study, or exact positions if there is no step.
         """
         record = simulator.run(
             self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"

@@ -126,7 +126,7 @@ def _compiled(
         if done.returncode or not target.is_file():
             first = next(iter(done.stderr.strip().splitlines()), "no message")
             raise NotCompiledError(
-                f"the compiler {' '.join(command)} failed with {done.returncode}: {first}"
+                f"the compiler {' '.join(command)} failed with exit code {done.returncode}: {first}"
             )
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)

@@ -70,7 +70,8 @@ def tick_function(
 
     x : q, qd, y1, y2, I, u.
     signals : q_r, qd_r, feed-forward, encoder noise, disturbance.
-    law : (n, columns) of `VECTORS`, then R, R^-1 and offset of the encoder.
+    law : the settings of the control law in `VECTORS`, one column each, shape (n, columns), then R,
+        R^-1 and offset of the encoder.
     flags : T, delay, weights of the two differences.
     """
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)

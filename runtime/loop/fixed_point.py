@@ -48,7 +48,8 @@ class FixedPointOptions(LoopOptions):
         X^0: ols, values of the robot file, unit (motor inertia, else inertia or mass of the own
         link, 1 for every joint; all others 0), or parameters by name, with all others 0.
     gains : str
-        X_ref of g: ols, values, start, or one (no rescaling).
+        Parameters X_ref from which the gain rescaling g is computed: ols, values, start, or one (no
+        rescaling).
     passes : int
         Largest number of passes with rescaled gains, and with g = 1.
     change : float

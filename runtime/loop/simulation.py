@@ -205,7 +205,8 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks, each in `substeps` integrations.
+        """Return the CasADi function that simulates one block of ticks, each in `substeps`
+        integrations.
 
         A tick is a sampling period of the controller. Each function is made once.
         """
@@ -217,7 +218,7 @@ class Simulator:
     def _iterated(
         self, x: Array, signals: Array, X: Array, law: Array, substeps: int
     ) -> tuple[Array, Array]:
-        """Simulate all sampling periods (ticks) of a run, in calls of BLOCK ticks each.
+        """Simulate all sampling periods (ticks) of a run, in blocks of ticks.
 
         Parameters
         ----------

@@ -56,8 +56,8 @@ class Body:
     place : Place
         The place whose frame is used.
     value, sigma : ndarray, shape (10,)
-        Mass, centre and inertia in the order of `NUMBERS`, and their standard deviations; nan for a
-        number that no torque determines.
+        Mass, centre of mass (x, y, z) and inertia tensor (xx, yy, zz, xy, xz, yz), and their
+        standard deviations; nan for a number that no torque determines.
     """
 
     place: Place
@@ -147,7 +147,7 @@ def body_at(
     T : ndarray, shape (4, 4)
         Pose, in the frame of the link, of the frame of chi.
     chi : ndarray, shape (10,)
-        Parameters of the load, in the order of INERTIAL.
+        Parameters of the load, in the order XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
     covariance : ndarray, shape (10, 10)
         Covariance of chi; zero for given parameters.
     unknown : sequence of bool, shape (10,)

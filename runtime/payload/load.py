@@ -292,7 +292,7 @@ class Mount:
     def action(self) -> Array:
         """Matrix A, (10, 10), that transforms inertial parameters from `frame` to the link frame.
 
-        The order of the parameters is that of INERTIAL.
+        The order of the parameters is XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
         """
         return np.column_stack(
             [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
@@ -401,7 +401,7 @@ def load_effect(
 
 
 def load_vector(load: Mapping[str, float]) -> Array:
-    """Return the ten parameters of a load in the order of INERTIAL; raise InputError for any other
+    """Return the ten parameters of a load in the order XX ... M; raise InputError for any other
     name.
     """
     if unknown := [name for name in load if name not in INERTIAL]:
@@ -448,7 +448,7 @@ def load_of_body(
 
 
 def ten_parameters(P: Array) -> Array:
-    """Compute the ten inertial parameters from a pseudo-inertia P, in the order of INERTIAL.
+    """Compute the ten inertial parameters from a pseudo-inertia P, in the order XX ... M.
 
     J = tr(S) 1 - S, with S its matrix of second moments.
     """

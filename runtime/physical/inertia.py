@@ -181,7 +181,7 @@ def physical_model(
 def pseudo_inertia(ten: Array) -> Array:
     """Build the pseudo-inertia P_j, shape (4, 4), from the ten inertial parameters of a link.
 
-    The parameters are in the order of INERTIAL, about the origin of the link frame.
+    The parameters are XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M, about the origin of the link frame.
     """
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])

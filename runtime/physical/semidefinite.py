@@ -252,7 +252,7 @@ class Program:
         self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
-        """Solve the program with the tightest tolerances that Clarabel reaches (TOLERANCES)."""
+        """Solve the program with the tightest tolerances that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
         status = ""
         Q = np.diag(self.diagonal)

@@ -257,7 +257,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Row:
-    """One kind of possible error (a row of the tables CAUSES and NUMBERS), and how to correct it.
+    """One kind of possible error (a row of the table `CAUSES` or `NUMBERS`), and how to correct it.
 
     Attributes
     ----------
@@ -266,12 +266,12 @@ class Row:
         Yields the items for which the cause is tried, for instance joints.
     says, remedy, subject : str
         Sentences with the words of an item in braces; the default of `subject` is `says`.
-    maps : function of the Robot, the item and, in NUMBERS, xi
+    maps : function of the Robot, the item and, in the table `NUMBERS`, xi
         Returns the fields of the Cause that change the samples or the table of frames.
     span : float
-        In NUMBERS, the largest |xi| to which the search extends.
+        In the table `NUMBERS`, the largest |xi| to which the search extends.
     words : function of the Robot, the item and xi
-        In NUMBERS, returns words of the sentences that depend on xi.
+        In the table `NUMBERS`: returns the words of the sentences that depend on xi.
     change : function of the Robot and the item
         Returns the remedy as settings of the study.
     """
@@ -289,7 +289,7 @@ class Row:
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
         """Make the `Cause` of this kind of error for one item, for instance for one joint.
 
-        Rows of NUMBERS also need xi, the unknown number.
+        Rows of the table `NUMBERS` also need xi, the unknown number.
         """
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
         says, change = self.says.format(**words), self.change(robot, item)
@@ -1217,6 +1217,6 @@ NUMBERS = (
 def causes(robot: Robot) -> list[Cause]:
     """List the possible errors (causes) of the study and of the table of frames for a given robot.
 
-    The list has the errors of the table CAUSES, which have no unknown number.
+    The list has the errors of the table `CAUSES`, which have no unknown number.
     """
     return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]

@@ -461,7 +461,7 @@ def try_causes(
 ) -> list[Trial]:
     """Try every possible error of the study (cause), and return the fits, the best first.
 
-    Some kinds of causes (DEAR) are improbable, so that their gain is lowered (by RATE_GAIN in
+    Some kinds of causes are improbable, so that their gain is lowered (by RATE_GAIN in
     limits.toml).
     """
     model, variants, samples = baseline.model, baseline.variants, baseline.samples

@@ -102,7 +102,8 @@ def _require_seconds(table: Table, name: str) -> None:
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Insert NONE (no column) into the list of torque columns for each joint without a motor.
+    """Insert the mark for "no column" into the list of torque columns, for each joint without a
+    motor.
 
     names : columns of all joints, or of the joints with a motor only. Other names are returned
     unchanged.

@@ -49,7 +49,7 @@ class Family:
     ----------
     quantity : "t", "q", "tau", "qd", "other" or ""
     word : int
-        Place of the word in the names among the words of the quantity in `WORDS`.
+        Position of the word that the names contain in the list of words of the quantity.
     target : int
         0 measured, 1 without such a word, 2 commanded.
     names : tuple of str
@@ -324,8 +324,8 @@ def _aliases(joints: Sequence[str]) -> list[list[str]]:
 def _quantity(name: str, stem: str = "") -> tuple[str, int]:
     """Find the quantity that the words of a column name mean, for instance "tau".
 
-    Also return the place of the word in `WORDS`. The unit decides between positions, speeds and
-    torques. Return ("", 0) if the name means no quantity.
+    Also return the position of the word in the list of words of the quantity. The unit decides
+    between positions, speeds and torques. Return ("", 0) if the name means no quantity.
     """
     words = words_of(stem or name)
     meanings: dict[str, int] = {}
@@ -349,7 +349,9 @@ def _quantity(name: str, stem: str = "") -> tuple[str, int]:
 
 
 def _word(quantity: str, place: int) -> str:
-    """Return the word at a place of `WORDS`; "" if a unit, not a word, shows the quantity."""
+    """Return the word at a position in the list of words of a quantity; "" if a unit, not a word,
+    shows the quantity.
+    """
     words = WORDS.get(quantity, ())
     return words[place] if place < len(words) else ""
 

@@ -335,7 +335,7 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the column names without the mark NONE of joints that have no column."""
+    """Return the column names, without the marks of the joints that have no column."""
     return tuple(name for name in names if name != NONE)
 
 

@@ -55,7 +55,7 @@ def plain(text: str) -> str:
 
 
 def _column(place: int) -> tuple[str, ...]:
-    """Words of one column of `LANGUAGES`, of all languages, each once."""
+    """Words of all languages for one kind of quantity, each once."""
     return tuple(
         dict.fromkeys(
             plain(word).lower()

@@ -191,7 +191,8 @@ def page_file(regrouping: Regrouping, output: Path | None) -> Path:
 def model_text(
     robot: Robot, model: str, kind: str, asked: Mapping[str, Any], decimals: bool = False
 ) -> str:
-    """Return a symbolic model of a robot, such as its inertia matrix, as text in one of FORMATS.
+    """Return a symbolic model of a robot, such as its inertia matrix, as text in one of the formats
+    of `symgen show`.
 
     asked : options of --model that the user gave.
     decimals : whether to write coefficients without symbols as decimal numbers.

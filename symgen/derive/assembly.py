@@ -117,9 +117,9 @@ def newton(
 ) -> Array:
     """Solve r(q) = 0 by Newton's method with least-squares steps, from a start q (..., n).
 
-    Only the `columns` of q change, by at most STEP in each iteration. A state stops below the
-    tolerance, or after STALLED iterations without progress, independently of the other states. The
-    caller must check the residual at the end.
+    Only the `columns` of q change, by a limited step in each iteration. A state stops below the
+    tolerance, or after some iterations without progress (`STALLED`), independently of the other
+    states. The caller must check the residual at the end.
     """
     q, best, stalled = q.copy(), np.full(q.shape[:-1], np.inf), np.zeros(q.shape[:-1])
     going = np.ones(q.shape[:-1], dtype=bool)

@@ -217,8 +217,8 @@ def numbered(robot: Robot) -> Robot:
 def keep_rationals(e: Expression) -> Expression:
     """Replace each rational coefficient of a polynomial by a symbol that has the same value.
 
-    Coefficients inside square roots and inverses are replaced too. Whole numbers up to
-    LARGEST_WHOLE stay numbers.
+    Coefficients inside square roots and inverses are replaced too. Whole numbers up to 12
+    (`LARGEST_WHOLE`) stay numbers.
     """
     total = Expression()
     for m, c in e.terms.items():

@@ -158,8 +158,8 @@ class LoopSystem:
     def pace(self) -> float:
         """Return a step of the actuated joints so small that no passive joint moves far.
 
-        The step is computed from the rates at the start configuration (PACE), in rad or, for a
-        prismatic joint, as a fraction of the longest length.
+        The step is computed from the rates at the start configuration and the limits in `PACE`, in
+        rad or, for a prismatic joint, as a fraction of the longest length.
         """
         J = self.jacobian_floats(self.start)
         n = self.tied.start

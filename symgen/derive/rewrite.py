@@ -132,8 +132,9 @@ class Rewrite:
     def _name(self, node: Node, image: Scalar, *, merged: bool) -> None:
         """Give a copied node the name of its original.
 
-        A node that was merged with an earlier node gets no name of a RECURSIVE family. Otherwise U
-        = DV - WP, if it equals a product in WP = DV - product, would turn the recursion around.
+        A node that was merged with an earlier node gets no name of a quantity of the recursion,
+        such as U or WP. Otherwise U = DV - WP, if it equals a product in WP = DV - product, would
+        turn the recursion around.
         """
         signed = image if node.name_sign > 0 else -image
         tag = self._tag if node.index in self._replaced else ""

@@ -5,12 +5,12 @@ For each key j, an element has one standard parameter c, named family + key (for
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The law of each kind is an expression in KINDS, in which q, qd, qdd mean s, sd, sdd. A new kind is
-one entry in KINDS (docs/contributing.md). A column is an element with a law of the user, in s, sd,
-q1, qd1 ... of any joints, constants and scalars. This law is a torque, or an energy U with
-Gamma += c dU/dq. A form is possible only for the laws qdd, qd and q. If `when` is given, a viscous
-or coulomb element acts only in motion along s in this direction. In a law, channel.NAME is the
-constant NAME as a function of time, and tau_model is the torque that the rest of the model
+The law of each kind is an expression in the table `KINDS`, in which q, qd, qdd mean s, sd, sdd. A
+new kind is one entry of this table (docs/contributing.md). A column is an element with a law of the
+user, in s, sd, q1, qd1 ... of any joints, constants and scalars. This law is a torque, or an energy
+U with Gamma += c dU/dq. A form is possible only for the laws qdd, qd and q. If `when` is given, a
+viscous or coulomb element acts only in motion along s in this direction. In a law, channel.NAME is
+the constant NAME as a function of time, and tau_model is the torque that the rest of the model
 transmits at the joint.
 """
 
@@ -191,7 +191,7 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """Make a nonlinear constant (LawScalar) of an element from its default in the table KINDS.
+    """Make a nonlinear constant (LawScalar) of an element from its default in the table `KINDS`.
 
     The default is a fixed number, or bounds and a start value.
     """

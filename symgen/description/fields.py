@@ -86,8 +86,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Given:
-    """A field value that the reader of a robot file adds, such as the file name, because the file
-    does not contain it.
+    """A field value that the reader of a robot file adds, such as the file name.
 
     The file has no key for this field.
     """

@@ -281,7 +281,7 @@ def write_robot(
     robot : Robot
         The robot to be written.
     file : str
-        Name of the file, with one of the suffixes WRITTEN.
+        Name of the file, with the suffix .yaml, .yml or .urdf.
     comments : sequence of str
         Comment lines at the top of a robot file (.yaml).
 
@@ -301,7 +301,7 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Return the content of a robot file as bytes, cut off after MAX_BYTES + 1 bytes.
+    """Return the content of a robot file as bytes, cut off just above the largest allowed size.
 
     Raises DescriptionError if the file cannot be read.
     """

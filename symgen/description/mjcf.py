@@ -588,7 +588,7 @@ def _forces(model: Any) -> list[str]:
 
 
 def _quoted(names: Sequence[str]) -> str:
-    """List at most SHOWN names in quotes."""
+    """List the first few names in quotes."""
     return ", ".join(f"{name!a:.60}" for name in names[:SHOWN])
 
 

@@ -308,7 +308,7 @@ class Robot:
         """Names of the rows of the torques, by key, in their order.
 
         The key of a joint is its number. A free base has six rows before the joints, with the keys
-        of BASE_ROWS.
+        -5 ... 0.
         """
         return (BASE_ROWS if self.base_is_free else {}) | {j: str(j) for j in self.joints}
 

@@ -91,7 +91,7 @@ class Joint:
     name : str
         Name in the file.
     kind : str
-        One of MOVING, FIXED_TYPE, or FREE_TYPE; a joint of FREE_TYPE must be held.
+        A kind of moving joint, `FIXED_TYPE`, or `FREE_TYPE`; a free joint must be held.
     parent, child : str
         Names of the links; the frame of `child` is the joint frame at q = 0.
     pose : ndarray, shape (4, 4)
@@ -130,8 +130,9 @@ class TreeLoop:
     name : str
         Name in the file.
     kind : str
-        The motion that the loop leaves free: revolute (about z), HINGE, prismatic (along z),
-        spherical (any rotation), or fixed (none).
+        The motion that the loop leaves free: revolute (about z), hinge (about the direction of all
+        other hinges around the loop), prismatic (along z), spherical (any rotation), or fixed
+        (none).
     links : two str
         Names of both links.
     poses : two ndarrays, shape (4, 4)

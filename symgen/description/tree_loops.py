@@ -278,7 +278,7 @@ def _common(axes: list[Array]) -> Array | None:
 def _turns_about(loop: TreeLoop, pose: Mapping[str, Array], axis: Array) -> bool:
     """Whether a loop among hinges parallel to `axis` leaves a rotation about this direction only.
 
-    The direction of a revolute loop may be rounded by ROUNDED.
+    The direction of a revolute loop may be rounded, by a sine of at most 0.001 (`ROUNDED`).
     """
     if loop.kind in ("spherical", HINGE):
         return True

@@ -301,7 +301,7 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
     """Round a row of alternating angles and lengths as the frame table stores them.
 
-    Angles that are multiples of pi/12 are exact; other numbers get DIGITS decimals.
+    Angles that are multiples of pi/12 are exact; other numbers get 13 decimals.
     """
     return tuple(_angle(x)[0] if k % 2 == 0 else round(x, DIGITS) + 0.0 for k, x in enumerate(row))
 

@@ -153,7 +153,7 @@ class Regrouping:
         The recursive form: each step removes the standard parameter `from` and adds coefficient *
         `from` to the parameter `into`.
     method : str
-        How the coefficients were derived: EXACT, or NUMERIC and the reason.
+        How the coefficients were derived: the text `EXACT`, or the text `NUMERIC` and the reason.
     """
 
     robot: Robot

@@ -287,7 +287,8 @@ class Recognition:
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
         """Find the power n with which a coefficient scales with one variable; 0 if there is none.
 
-        `scaled` holds the coefficient modulo p with the variable multiplied by each of SCALES.
+        `scaled` holds the coefficient modulo p with the variable multiplied by each factor in
+        `SCALES`.
         """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []

@@ -80,7 +80,7 @@ class WorkFolder:
         """Return the first existing robot file with one of the given endings; None if there is no
         such file.
 
-        With the endings of TREES, the file is the user's own file.
+        A URDF or MJCF file is the user's own file.
         """
         found = (self.path / f"robot{ending}" for ending in endings)
         return next((path for path in found if path.is_file()), None)

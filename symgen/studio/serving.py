@@ -34,8 +34,8 @@ PULSE = 0.25  # s between two events of one page
 def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
     """Build the web application of the studio, with a secret token at the start of every path.
 
-    The function `end` is called when no page has been open and no command has run for IDLE_TIME
-    seconds.
+    The function `end` is called when no page has been open and no command has run for ten minutes
+    (`IDLE_TIME`).
     """
 
     async def events(request: Request) -> Response:

@@ -156,8 +156,8 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Prepare a symbolic model of the robot in four forms: typeset, text, LaTeX and SymPy.
 
-    The form is the requested one; a closed form of more than TYPESET terms is not typeset. If a
-    model has too many terms for a closed form, all forms show its recursion.
+    The form is the requested one; a closed form of more than 1000 terms (`TYPESET`) is not typeset.
+    If a model has too many terms for a closed form, all forms show its recursion.
     """
     from symgen.symbols.documents import notes, printed, shown_model
     from symgen.symbols.symbolic_model import NoClosedFormError

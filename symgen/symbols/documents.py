@@ -384,7 +384,8 @@ def width(text: str) -> int:
 def escaped(text: str) -> str:
     """Replace the special characters of plain text, so that LaTeX prints the text unchanged.
 
-    A letter that many fonts lack is written by the command \\other, which PREAMBLE defines.
+    A letter that many fonts lack is written by the command \\other, which the preamble of the
+    document defines.
     """
     return "".join(_SPECIAL.get(c) or _written(c) for c in text)
 

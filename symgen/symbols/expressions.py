@@ -166,7 +166,7 @@ def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
 def in_decimals(regrouping: Regrouping) -> Regrouping:
     """Convert the numerical coefficients of the regrouping formulas to decimals, for display.
 
-    The decimals have DIGITS digits. Coefficients that contain symbols are not changed.
+    The decimals have 15 digits. Coefficients that contain symbols are not changed.
     """
 
     base = (

@@ -325,8 +325,9 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
 def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
     """Find the link and joint values of a physically possible robot with given base parameters.
 
-    The equation is K chi(u) = rest, with the standard parameters chi. Return u and "", or None and
-    the reason why no physical robot has these base parameters.
+    The equation is K chi(u) = rest, with the standard parameters chi; `rest` is the part of the
+    base parameters X that does not come from values which stay as in the file. Return u and "", or
+    None and the reason why no physical robot has these base parameters.
     """
     K = part.physical.rows(names)
     sizes = np.maximum(np.abs(X), np.abs(K) @ scales(part.physical))
@@ -357,8 +358,9 @@ def _clean(part: Numbers, K: Array, rest: Array, u: Array, missed_most: float) -
     """Reset numbers that have hardly moved to their values in the file, and let the others give K
     chi = rest.
 
-    A number that moved by less than NEAR of its size is reset if the others can compensate for it;
-    a number that moved by less than EQUAL of its size is reset whenever K chi = rest allows it.
+    A number that moved by less than 1e-6 of its size (`NEAR`) is reset if the others can compensate
+    for it; a number that moved by less than 1e-9 of its size (`EQUAL`) is reset whenever K chi =
+    rest allows it.
     """
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
@@ -511,8 +513,8 @@ def _hold(part: Numbers, u: Array) -> Array:
 def strange(link: FileLink, closest: Nearest) -> str:
     """Describe how far mass and centre of mass of a link are from the file; "" if they are near.
 
-    They are near if the mass is within a factor STRANGE and the centre has moved by no more than
-    the size of the link.
+    They are near if the mass is within a factor of 2 (`STRANGE`) and the centre has moved by no
+    more than the size of the link.
     """
     before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
     m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))

@@ -69,7 +69,7 @@ class Attributes:
         URDF or MJCF.
     inertial : mapping
         For each child element of <inertial> ("" is <inertial> itself): its attributes, and the
-        index in NUMBERS of each number in them.
+        index of each number in them in the list `NUMBERS` (mass, centre, tensor).
     dynamics : str
         The child element of a joint that contains its parameters; "" if the joint itself has them.
     joint : mapping
@@ -83,7 +83,9 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Order of mass, centre of mass and inertia in the file, as indices into NUMBERS."""
+        """Order of mass, centre of mass and inertia in the file, as indices into the list
+        `NUMBERS`.
+        """
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 
@@ -128,8 +130,9 @@ class LinkPlace:
     axes : ndarray, shape (3, 3)
         Orientation of the axes of the tensor in the link, as in the file or as compiled by MuJoCo.
     stated : ndarray, shape (10,), or None
-        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled. A link without
-        mass has them even in an MJCF, because its ten parameters do not contain its centre.
+        Mass, centre and tensor as a URDF states them; None for an MJCF, whose numbers are compiled.
+        A link without mass has these numbers even in an MJCF, because its ten parameters do not
+        contain its centre.
     """
 
     attributes: Attributes
@@ -149,7 +152,8 @@ class LinkPlace:
         """Convert ten inertial parameters in frame j to mass, centre of mass and tensor of the
         file.
 
-        The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of NUMBERS.
+        The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of the list
+        `NUMBERS`.
         """
         if not np.any(ten):
             return np.zeros(10)
@@ -403,7 +407,9 @@ class FileLink:
 
     @property
     def numbers(self) -> Array:
-        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in NUMBERS."""
+        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in the list
+        `NUMBERS`.
+        """
         return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
 
 

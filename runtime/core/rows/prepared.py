@@ -222,8 +222,8 @@ def certain(
 ) -> Selection:
     """Remove rows of unknown state, or of uncertain friction direction, from a selection of rows.
 
-    Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
-    zero speed. Without known errors of the velocities, the selection does not change.
+    A row removed because of missing positions is counted as "missing"; a row near zero speed, as
+    "direction". Without known errors of the velocities, the selection does not change.
     """
     if states.errors is None:
         return selection

@@ -179,7 +179,7 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """Evaluate the regressor at PROBES random states, shape (b, n, PROBES).
+    """Evaluate the regressor at m random states, shape (b, n, m).
 
     The result is nan if a loop does not close at one of the states.
     """

@@ -106,7 +106,7 @@ EXCERPT = 2**16
 def excerpt(record: Record, rows: Rows) -> slice:
     """Return the slice of the first samples in the time window, from which "auto" settings follow.
 
-    The slice has EXCERPT samples at most.
+    The length of the slice is limited (`EXCERPT`).
     """
     start, stop = window_of(record.t, rows.window, record.name)
     return slice(start, min(stop, start + EXCERPT))
@@ -119,8 +119,9 @@ def instants_of(record: Record, signals: Signals, rows: Rows) -> tuple[slice, in
     that it keeps, shape (K,), and the number of kept samples whose rows are left out at each end.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
-    spreads this error over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim:
-    auto leaves out END_PERIODS/cutoff before the decimation, and TRIM instants after it.
+    spreads this error over 27 instants (benchmarks/truth.md, Ends of records). Hence rows.trim:
+    auto leaves out some periods of the cutoff before the decimation, and some instants after it
+    (END_PERIODS and TRIM in limits.toml).
     """
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
@@ -251,8 +252,8 @@ def certain_rows(
 ) -> Array:
     """Find the rows with known state and known direction of dry friction, bool, shape (n, K).
 
-    A row of joint j is uncertain if |s| is below UNCERTAIN standard deviations of s; s = G qd is
-    the speed of a column that switches and acts on j.
+    A row of joint j is uncertain if |s| is below half a standard deviation of s (`UNCERTAIN`); s =
+    G qd is the speed of a column that switches and acts on j.
 
     states : shape (K, n), with known errors.
     """

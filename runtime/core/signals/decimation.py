@@ -19,9 +19,9 @@ blocks:
 
 [P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and
 v are K/G short steps. The start, and the samples after the last whole block with their reflection,
-have matrix products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. Of
-a long record, PART kept samples are computed at a time, from the samples that decide them: the
-effect of all other samples on them is below TRUNCATION.
+have matrix products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. A
+long record is computed in parts (`PART` kept samples), each from the samples that determine it: the
+effect of all other samples is negligible (below `TRUNCATION`).
 
 |lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows. The residues are computed from
 zeros and poles, because polynomial coefficients would lose all digits at n_d = 100.
@@ -79,7 +79,9 @@ class Operator:
 
     @property
     def reach(self) -> int:
-        """Number of samples until the slowest mode of the filter decays to the share TRUNCATION."""
+        """Number of samples until the slowest mode of the filter has decayed to nothing
+        (`TRUNCATION`).
+        """
         return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
 
 
@@ -127,7 +129,7 @@ class Plan:
     Ax: Array
 
     def pieces(self) -> list[tuple[int, int]]:
-        """Divide the N samples into pieces [t0, t1) of about PIECE samples.
+        """Divide the N samples into pieces [t0, t1) of about equal length.
 
         The pieces are made of whole blocks, except the first and the last piece.
         """
