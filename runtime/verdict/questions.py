@@ -22,6 +22,9 @@ from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
 
+COUNT_VALUES = "set validate: {values: true} in the study, so that single values count"
+"""What answers an open question about single values."""
+
 
 def of_single_values(question: Callable[[Identification], Check | None]) -> Callable[..., Any]:
     """Turn an answer about single values that is not good into a remark, with the state "open".
@@ -37,7 +40,7 @@ def of_single_values(question: Callable[[Identification], Check | None]) -> Call
         if check is None or counts or check.state == "good":
             return check
         finding = f"Single values do not count in this verdict. {check.finding}; {check.remedy}"
-        return replace(check, state="open", finding=finding, remedy="")
+        return replace(check, state="open", finding=finding, remedy=COUNT_VALUES)
 
     return asked
 

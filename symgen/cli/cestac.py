@@ -100,7 +100,7 @@ def cestac(
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:
-            with session.progress_bar("encoders" if advise else "runs") as progress:
+            with session.progress_bar("steps" if advise else "runs") as progress:
                 if advise:
                     asked, real = study.cestac.delta if delta else (), rounding in (None, "phase")
                     judged = encoder_readers(READERS, study.signals.reader) if real else {}

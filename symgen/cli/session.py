@@ -13,13 +13,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby, pairwise
 from pathlib import Path
+from shlex import join
 from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from symgen.cli.told import as_json, counter, error_data, tell
+from symgen.cli.told import as_json, counter, error_data, lines_of, tell
 from symgen.update.models import corrected as corrected
 from symgen.update.models import model_of as model_of
 from symgen.update.models import variants_of as variants_of
@@ -332,13 +333,19 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     return study
 
 
-def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
-    """Correct the settings that prevent reading the records, and write the new study to `path`.
+def suggested_study(
+    study: Study, model: GeneratedModel, path: Path, robot: str, *, json: bool = False
+) -> Study:
+    """Write a study with the settings that the records need to `path`, and say what it sets.
 
-    Settings that names and values do not show are marked `# ?` in the file; the command then ends
-    with exit code 1.
+    Settings that names and values do not show are marked `# ?` in the file. The command then ends
+    with exit code 0, and says what to fill in and how to go on.
+
+    robot : argument ROBOT, for the next command.
+    json : whether the output is JSON only; the sentences then go to the error stream.
     """
     from runtime.compose import reader_of
+    from runtime.ground.documents import json_text
     from runtime.ground.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import suggested
@@ -350,13 +357,24 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     folder = path.resolve().parent
     found = suggested(study, model, missing=reader_of(study.signals).missing)
     write_all(folder, {path.name: found.text(folder)})
-    for text in found.sentences:
-        say(text)
+    said = [f"{path} is written.", *(f"- {text}" for text in found.sentences)]
     if found.unrecognised:
-        say(f"{path} written; not recognised: {', '.join(found.unrecognised.values())}")
-        say(f"complete the lines marked # ?, then run symgen identify ROBOT {path}")
-        raise typer.Exit(NEGATIVE)
-    say(f"{path} written; check this file before you trust the values")
+        said += [
+            f"Fill in what the record does not show, marked # ? in {path}:",
+            *(f"- {text}" for text in found.unrecognised.values()),
+            f"Next: {join(['symgen', 'identify', robot, str(path)])}",
+        ]
+    else:
+        said += ["Check this file before you trust the values."]
+    if json:
+        for line in said:
+            say(line)
+    else:
+        show("\n".join([*said, *([] if found.unrecognised else [""])]))
+    if found.unrecognised:
+        if json:
+            show(json_text({"study": str(path), "fill_in": found.unrecognised}), json=True)
+        raise typer.Exit(0)
     return found.study
 
 
@@ -431,10 +449,13 @@ def progress_bar(what: str) -> Iterator[Any]:
     """Show a progress bar of `what` on the error stream for the duration of the block.
 
     Yield a function of the number of finished steps and the number of all steps, which updates the
-    bar.
+    bar. Where the error stream is no terminal, a line every ten seconds takes its place.
     """
     if as_json():
         yield counter()
+        return
+    if not sys.stderr.isatty():
+        yield lines_of(what)
         return
     from rich import progress as rich
     from rich.console import Console

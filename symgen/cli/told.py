@@ -21,6 +21,7 @@ import typer
 
 LINES = "SYMGEN_LINES"
 PAUSE = 0.1  # s between two counts
+LINE_PAUSE = 10.0  # s between two lines
 
 
 def as_json() -> bool:
@@ -41,6 +42,21 @@ def error_data(error: Exception) -> dict[str, Any]:
     path = [*map(str, getattr(error, "path", ()))]
     text = getattr(error, "message", "") if path else ""
     return {"error": text or str(error) or type(error).__name__, "path": path}
+
+
+def lines_of(what: str) -> Callable[[int, int], None]:
+    """Return a function that prints, every ten seconds, the finished steps and the time left."""
+    start = last = monotonic()
+
+    def count(done: int, total: int) -> None:
+        nonlocal last
+        now = monotonic()
+        if done and now - last > LINE_PAUSE:
+            last = now
+            left = (now - start) / done * (total - done)
+            tell(f"  {what}: {done} of about {total}, about {left:.0f} s left")
+
+    return count
 
 
 def counter() -> Callable[[int, int], None]:
