@@ -375,7 +375,10 @@ def predicted_advice(fit: MeasuredFit, group: EncoderGroup) -> EncoderAdvice:
     exponents = range(low, max(high, 0) + 1)
     delta = start * LIMIT.CURVE_RATIO ** np.array(exponents, dtype=float)
     changes = np.array([change(k) for k in exponents])
-    found = limits_of(delta, changes, fit.reference)
+    found = tuple(
+        Limit(one.percent, np.inf, "") if group.unit == "rad" and one.delta >= np.pi else one
+        for one in limits_of(delta, changes, fit.reference)
+    )  # an encoder that turns has two steps at least
     return EncoderAdvice(group.label, found, delta, changes, unit=group.unit)
 
 

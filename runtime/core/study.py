@@ -156,8 +156,8 @@ class Rows(Settings):
         tenth of it.
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise there.
-        auto: the speed is found from the record for joints whose torques at rest differ from the
-        model, and is zero for other joints.
+        auto: the speed is found from the record for joints with dry friction in the model whose
+        torques at rest differ from the model, and is zero for other joints.
     around : float, s
         Rows within this time of a row left out by low_speed are left out too; low_speed: auto sets
         it to the reach of the decimation.

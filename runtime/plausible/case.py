@@ -18,7 +18,7 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
 from runtime.core.signals.cutoff import noise_share
 from runtime.core.study import Study
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, MemoryTooSmallError
 from runtime.ground.limits import limits
 from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
@@ -118,10 +118,13 @@ class Case:
     def observation(self) -> Observation | None:
         """Observation matrix W and torques Y of all records, with the study as given.
 
-        The result is None if they cannot be computed, for instance if no row is left.
+        The result is None if they cannot be computed, for instance if no row is left. Raises
+        MemoryTooSmallError if they do not fit into the memory.
         """
         try:
             return stacked(self.model, self.given)
+        except MemoryTooSmallError:
+            raise
         except (InputError, np.linalg.LinAlgError):
             return None
 

@@ -563,7 +563,8 @@ class Rows(chapter.Rows):
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
         them. A text may have another unit: 2 rpm. auto: the speed is found from the record for
-        joints whose torques at rest differ from the model, and is zero for other joints.
+        joints with dry friction in the model whose torques at rest differ from the model, and is
+        zero for other joints.
     """
 
     _with_unit = field_validator("low_speed", mode="before")(speed)

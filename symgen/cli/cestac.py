@@ -121,7 +121,7 @@ def cestac(
                         )
                     said, good = resolution.message, resolution.verdict != "biased"
         except KeyboardInterrupt:
-            session.stopped(checkpoint)
+            session.stopped("" if checkpoint is None else checkpoint.kept)
         if results is not None:
             runtime.report(result, results, study=study)
         if checkpoint is not None and isinstance(result, runtime.Cestac) and result.lists_runs:

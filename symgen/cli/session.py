@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import timedelta
 from itertools import groupby, pairwise
 from pathlib import Path
 from shlex import join
@@ -20,14 +21,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from symgen.cli.told import as_json, counter, error_data, lines_of, tell
+from symgen.cli.told import as_json, counter, error_data, lines_of, tell, time_left
 from symgen.update.models import corrected as corrected
 from symgen.update.models import model_of as model_of
 from symgen.update.models import variants_of as variants_of
 
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
-    from runtime.parallel.checkpoint import Checkpoint
     from runtime.reporting.result_files import Results
     from runtime.study import Study
     from symgen.description import Robot
@@ -406,13 +406,9 @@ def names_of(text: str | None) -> str | list[str] | None:
     return text if text in (None, "essential", "all") else text.split(",")
 
 
-def stopped(checkpoint: Checkpoint | None) -> NoReturn:
-    """End the command after Ctrl-C with exit code 130; say how many runs of a study are saved."""
-    rest = (
-        f"{checkpoint.written} runs are in {checkpoint.file}: repeat the command to continue"
-        if checkpoint and checkpoint.written
-        else "nothing is kept"
-    )
+def stopped(kept: str) -> NoReturn:
+    """End the command after Ctrl-C with exit code 130; say what is kept, "" for nothing."""
+    rest = f"{kept}: repeat the command to continue" if kept else "nothing is kept"
     typer.echo(f"stopped; {rest}", err=True)
     raise typer.Exit(INTERRUPTED)
 
@@ -464,8 +460,15 @@ def progress_bar(what: str) -> Iterator[Any]:
         rich.TextColumn("{task.description}"),
         rich.BarColumn(),
         rich.MofNCompleteColumn(),
-        rich.TimeRemainingColumn(),
+        rich.TextColumn("{task.fields[left]}"),
     )
+    left = time_left()
     with rich.Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        task = progress.add_task(what, total=None, left="")
+
+        def update(done: int, total: int) -> None:
+            seconds = left(done, total)
+            text = "" if seconds is None else f"{timedelta(seconds=round(seconds))} left"
+            progress.update(task, completed=done, total=total, left=text)
+
+        yield update

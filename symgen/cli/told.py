@@ -3,7 +3,7 @@
 SYMGEN_LINES=json symgen cestac arm.urdf study.yaml 2> lines.jsonl
 
 {"stage": "identification"}                     a part of the work begins
-{"done": 3, "total": 40}                        runs, encoders or starts
+{"done": 3, "total": 40, "left_s": 61.2}        runs, records or starts; time that the others need, or null
 {"note": "..."}                                 a doubt about robot or record
 {"report": "results/report.html"}               what was written
 {"error": "...", "path": ["signals", "rate"]}   why the command ends; keys of the wrong setting
@@ -51,10 +51,10 @@ def lines_of(what: str) -> Callable[[int, int], None]:
     def count(done: int, total: int) -> None:
         nonlocal last
         now = monotonic()
-        if done and now - last > LINE_PAUSE:
+        if 0 < done < total and now - last > LINE_PAUSE:
             last = now
             left = (now - start) / done * (total - done)
-            tell(f"  {what}: {done} of about {total}, about {left:.0f} s left")
+            tell(f"  {what}: {done} of {total}, about {left:.0f} s left")
 
     return count
 
@@ -63,12 +63,31 @@ def counter() -> Callable[[int, int], None]:
     """Return a function that prints the number of finished steps and of all steps, at most ten
     times a second.
     """
-    last = 0.0
+    last, left = 0.0, time_left()
 
     def count(done: int, total: int) -> None:
         nonlocal last
+        seconds = left(done, total)
         if done == total or monotonic() - last > PAUSE:
             last = monotonic()
-            tell("", done=done, total=total)
+            tell("", done=done, total=total, left_s=seconds)
 
     return count
+
+
+def time_left() -> Callable[[int, int], float | None]:
+    """Return a function of the numbers of finished steps and of all steps: time of the others, s.
+
+    The time is (total - done) (t - t0)/(done - done0), with t0 and done0 of the first call, so that
+    steps which were finished before do not count. It is None until another step is finished.
+    """
+    first: list[tuple[float, int]] = []
+
+    def left(done: int, total: int) -> float | None:
+        now = monotonic()
+        if not first:
+            first.append((now, done))
+        start, before = first[0]
+        return (total - done) * (now - start) / (done - before) if done > before else None
+
+    return left
