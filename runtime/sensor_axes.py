@@ -1,4 +1,4 @@
-"""Is the sensor on a base that moves mounted, and are its units, as the study says?
+"""Check whether mounting and units of the sensor on a base that moves are as the study states.
 
 A gyroscope reads w and an accelerometer f in the axes of the sensor. Another reading of the record,
 
@@ -7,7 +7,7 @@ A gyroscope reads w and an accelerometer f in the axes of the sensor. Another re
 has a rotation G by multiples of 90 degrees (24 of them), the sign s of the accelerometer, and the
 factors u and v of the units deg/s and g where the size of the signals suggests them. Each reading
 gives another motion of the base, hence other rows. The parameters are fitted to a part of the rows
-of each reading; one that halves the error is told.
+of each reading; a reading that halves the error is reported.
 """
 
 from __future__ import annotations
@@ -32,9 +32,10 @@ RIDGE = 1e-12  # of the largest eigenvalue of W'W
 
 
 def sensor_axes(result: Identification) -> Doubt | None:
-    """Tell a rotation, sign or unit of the sensor on the base that explains the record much better.
+    """Report a rotation, sign or unit of the sensor on the base that explains the record much
+    better.
 
-    None without a sensor, or if no other reading halves the error.
+    The result is None if there is no sensor, or if no other reading halves the error.
     """
     owned = [own for own in result.problem.prepared if BASE_IMU in own.record.channels]
     if not owned or result.estimate.relative_error < LIMIT.AXES_DOUBTED:
@@ -79,7 +80,9 @@ class _Samples:
 
 
 def _lever(w: Array, wd: Array, r: Array) -> Array:
-    """Return wd x r + w x (w x r): what an accelerometer at r reads beside one at the origin."""
+    """Return wd x r + w x (w x r): the difference between the readings of an accelerometer at r and
+    one at the origin.
+    """
     return np.asarray(np.cross(wd, r) + np.cross(w, np.cross(w, r)))
 
 
@@ -102,7 +105,7 @@ def _error(
 ) -> float:
     """Fit the parameters to the rows of one reading; return the relative error of the torques.
 
-    Each row of the torques counts by its own size.
+    Each joint is weighted by the size of its torques.
     """
     rows, torques = [], []
     scale = np.sqrt(sum((x.Y**2 * x.used).sum(axis=1) for x in samples))

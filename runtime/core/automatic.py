@@ -1,8 +1,9 @@
 """Replacement of the setting `signals.lowpass.cutoff: auto` by cut-off frequencies in Hz.
 
 Each fitted record gets the cut-off that it would have alone, since its rate and the noise of its
-positions are its own. The study gets the cut-off of all these records together: it stands for a
-record that is too short or does not move, and is the highest for a record that is predicted.
+positions are its own. The study gets the cut-off of all these records together. This cut-off is
+used for a record that is too short or does not move, and is the upper limit for a record that is
+predicted.
 
 Contacts shake a robot at all frequencies. Near the cut-off, the filter takes part of this motion from
 W and not from Y, which biases the parameters. So `decimate.factor: auto` keeps every third row of eq.

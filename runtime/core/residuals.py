@@ -4,7 +4,7 @@ Eqs. (9), (10) assume that the residuals of a joint are independent. With rho_k,
 at a distance of k rows,
 
     Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m
-            chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
+            chi^2 with m degrees of freedom if they are independent         Ljung and Box (1978)
     N_eff = N / (1 + 2 sum_k rho_k)
             number of independent rows that give a mean of the same accuracy; the sum ends
             before the first rho_k <= 0
@@ -151,7 +151,7 @@ def correlation(products: Array, pairs: Array) -> Array:
 def correlation_time(rho: Array) -> float:
     """Compute the correlation time, as a number of rows, from the autocorrelation rho_k.
 
-    It is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
+    The time is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
     """
     end = np.flatnonzero(rho <= 0)
     return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())

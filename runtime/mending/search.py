@@ -1,12 +1,13 @@
 """Search for the changes of a study that explain the rows of the search: a beam of few readings.
 
-From each reading one goes on by the causes that explain its rows better (`runtime.plausible`), by
-patterns of reversed torques, another direction of gravity, and delays. A step need not be decisive
-while the error is large: a second error hides a part of what the first correction gains, and a
-wrong one may gain more. Where the error is small, only named causes are tried.
+The search continues from each reading with the causes that explain its rows better
+(`runtime.plausible`), patterns of reversed torques, another direction of gravity, and delays. While
+the error is large, the evidence for a step need not be decisive: a second error hides a part of the
+gain of the first correction, and a wrong correction may gain more. If the error is small, only
+named causes are tried.
 
-Then each number of the best reading is searched again beside all other changes, since it was fitted
-while another error was still there.
+Then each number of the best reading is searched again beside all other changes, because it was
+fitted while another error was still there.
 """
 
 from __future__ import annotations
@@ -143,7 +144,9 @@ class Search:
 
 
 def different(readings: list[Reading], N: float) -> list[Reading]:
-    """Return the readings from which the search goes on: the best ones, of several kinds first."""
+    """Return the readings from which the search continues: the best ones, with different kinds of
+    changes first.
+    """
     ranked = sorted(readings, key=lambda one: one.score(N))
     kinds: set[str] = set()
     first: list[Reading] = []
@@ -155,15 +158,17 @@ def different(readings: list[Reading], N: float) -> list[Reading]:
 
 
 def simple_rate(factor: float) -> bool:
-    """Whether a factor on the sampling rate is one of those that a wrong rate has.
+    """Whether a factor on the sampling rate is a typical result of a wrong rate.
 
-    A fitted factor takes up what other errors leave.
+    Other errors make a fitted factor inexact.
     """
     return any(abs(factor / known - 1) < 1e-9 for known in TRIED.RATE_FACTORS)
 
 
 def other_rates(reading: Reading) -> list[Cause]:
-    """Return the causes of another sampling rate, which a second error may hide from a trial."""
+    """Return the causes that change the sampling rate, because a second error may prevent a trial
+    from finding them.
+    """
     if reading.data.case.noise_floor > TRIED.NOISY:  # small accelerations undo what noise makes
         return []
     robot = reading.robot

@@ -12,8 +12,8 @@ weights the rows as for ols ("none") and wls. Without a prior, the least-squares
 result if it is feasible.
 
 options (also all options of `runtime.physical.feasibility.RobotLimits`):
-    margin     smallest eigenvalue of every condition: of a link with values in the robot file as
-               share of its second moment and mass there (S_j), of others in SI; 1e-6
+    margin     smallest eigenvalue of every condition: for a link with values in the robot file,
+               as share of its second moment and mass there (S_j); for others, in SI; 1e-6
     prior      none | euclidean: distance D of the inertial parameters from the values of the robot
                file; "auto": euclidean if the file has values of links, else none
     weight     weight of D, a number; "held-out": the weight with which four fifths of the record in
@@ -82,8 +82,8 @@ class FeasibleOptions(RobotLimits):
     Attributes
     ----------
     margin : float
-        Smallest eigenvalue of every condition: of a link with values in the robot file as share of
-        its second moment and mass there, of others in SI.
+        Smallest eigenvalue of every condition: for a link with values in the robot file, as share
+        of its second moment and mass in this file; for others, in SI.
     prior : str
         Distance D of the inertial parameters from the values of the robot file: none or euclidean;
         auto: euclidean if the file has values of links, else none.
@@ -98,8 +98,8 @@ class FeasibleOptions(RobotLimits):
         links have a length, prismatic joints have limits, and the record does not contradict the
         bounds; null: no such bounds.
     explain : bool
-        Whether to name every condition that least squares breaks; false: only the parameters, in a
-        third of the time.
+        Whether to name every condition that least squares breaks; false: only the parameters are
+        computed, in a third of the time.
     linear : mapping
         Options of the least squares that starts the method: rank_tolerance, block.
     """
@@ -216,7 +216,8 @@ def within_limits(
 ) -> Feasibility:
     """Check whether base parameters X are physical and, if so, within the limits of the robot.
 
-    The two are separate because the limits are known or guessed values of a robot, not physics.
+    The two checks are separate because the limits are known or guessed values of a robot, not
+    physics.
     """
     judged = feasibility(physical, names, X, blame=options.explain)
     named = dict.fromkeys(limit_rows(physical, options).names)
@@ -270,10 +271,10 @@ def held_out_weight(
     """Choose the weight of the prior with which a fit best predicts data not used in this fit.
 
     Four fifths of the record predict the other fifth, five times; the product of the five errors is
-    smallest. A sum would be decided by a fifth that alone determines a parameter, since the others
-    predict it badly unless the prior is strong. If two weights are equally good, the larger is
-    chosen. A weight is abandoned as soon as it cannot be the best, since no prediction error is
-    below the error of least squares on the same fifth.
+    smallest. A sum of the errors would be decided by a fifth that alone determines a parameter,
+    since the other fifths predict it badly unless the prior is strong. If two weights are equally
+    good, the larger is chosen. A weight is abandoned as soon as it cannot be the best, since no
+    prediction error is below the error of least squares on the same fifth.
     """
     number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
@@ -390,8 +391,8 @@ def bounds_contradict(
 ) -> bool:
     """Whether mass and centre-of-mass bounds guessed from the robot size contradict the record.
 
-    The bounds contradict the record if they raise the residual norm by more than the factor
-    LIMIT.WEIGHT_INCREASE, or if no robot is within the bounds.
+    The bounds contradict the record if they raise the residual norm by more than a small factor
+    (WEIGHT_INCREASE in limits.toml), or if no robot is within the bounds.
     """
     if unbounded is None or bounded is None:
         return unbounded is not None

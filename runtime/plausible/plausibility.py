@@ -7,7 +7,7 @@ One call answers several questions, each with a Check:
     EXPLAINED    questions about causes (`runtime.plausible.causes`), which are tried if
                  `variants` is given or if another check is doubtful
 
-A new check is a function of a `Case` and its line in CHECKS (docs/contributing.md).
+A new check is a function of a `Case` and its line in the table `CHECKS` (docs/contributing.md).
 """
 
 from __future__ import annotations

@@ -206,8 +206,8 @@ def torques(case: Case) -> Answer:
 def lengths(case: Case) -> Answer | None:
     """Check whether the links of the robot file are as long as those of an arm.
 
-    Lengths are distances between frames, computed in the positions of the record. None if these are
-    not known.
+    Lengths are distances between frames, computed in the positions of the record. The result is
+    None if these positions are not known.
     """
     P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
     if P is None or not P.shape[1]:
@@ -234,8 +234,8 @@ def lengths(case: Case) -> Answer | None:
 def inertias(case: Case) -> Answer | None:
     """Check whether real bodies can have the masses and inertias of the robot file.
 
-    The pseudo-inertia of every link must be positive semidefinite. None if the file gives no
-    values.
+    The pseudo-inertia of every link must be positive semidefinite. The result is None if the file
+    gives no values.
     """
     if case.physical is None or not case.physical.values:
         return None
@@ -250,8 +250,8 @@ def inertias(case: Case) -> Answer | None:
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
     """Yield a sentence for each link whose values put its mass too far from its frame.
 
-    Too far is more than LIMIT.LINK_EXTENT times the reach of the robot (`length`, m). Values of the
-    link that the file does not give count as zero.
+    The limit is a multiple (LINK_EXTENT in limits.toml) of the reach of the robot (`length`, m).
+    Values of the link that the file does not give count as zero.
     """
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}

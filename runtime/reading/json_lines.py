@@ -32,7 +32,9 @@ def read_json_lines(path: Path, options: Options) -> Table:
         try:
             sample = json.loads(line)
         except (ValueError, RecursionError) as e:
-            raise InputError(f"no JSON ({e}); {EXPECTED}"[:300], file=path.name, row=row) from None
+            raise InputError(
+                f"the line is not JSON ({e}); {EXPECTED}"[:300], file=path.name, row=row
+            ) from None
         if not isinstance(sample, dict):
             raise InputError(f"{str(line)[:40]!r}; {EXPECTED}", file=path.name, row=row)
         samples.append(dict(_flat("", sample)))

@@ -184,7 +184,7 @@ def _without_delay(
 ) -> tuple[Stretch, dict[str, Array]]:
     """Shift late signals of one record to the instants of the positions.
 
-    delays : those of the columns of each late signal, s.   key : their name in the study.
+    delays : delays of the columns of each late signal, s. key : name of the delays in the study.
     """
     kept = inside(stretch.t, np.concatenate([*delays.values()]), key)
     late = {
@@ -218,7 +218,7 @@ class Signal:
     values: Array
 
     def finite(self, values: Array, hint: str = "", largest: float | None = None) -> Array:
-        """Return the values if all are finite and at most `largest`; else raise InputError."""
+        """Return the values; raise InputError unless all are finite and at most `largest`."""
         limits = {} if largest is None else {"largest": largest}
         return require_finite(
             values, self.names, self.table.file, self.table.row, hint=hint, **limits
@@ -335,7 +335,7 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the column names without the mark NONE of joints that have no column."""
+    """Return the column names, without the marks of the joints that have no column."""
     return tuple(name for name in names if name != NONE)
 
 
@@ -424,8 +424,8 @@ def _by_episodes(
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
     """Find the tables that contain the positions, the torques, and the known torques of a record.
 
-    The second of two files holds the torques, unless it alone has the known torques and the first
-    file has the torques.
+    The second of two files holds the torques, unless the second file has only the known torques and
+    the first file has the torques.
     """
     first = tables[0]
     last = tables[-1]
@@ -476,10 +476,10 @@ class Label:
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:
     """Give each record, and each file of the records, a unique name for results.
 
-    A record has the name in its settings, else that of its dataset, else that of its first file
-    without ending. Equal names are preceded by the folder (day1/run, day2/run), by more folders if
-    needed, and finally followed by a number. A file has its own name, or its path if another file
-    has the same name.
+    A record has the name in its settings, else the name of its dataset, else the name of its first
+    file without ending. Equal names are preceded by the folder (day1/run, day2/run), by more
+    folders if needed, and finally followed by a number. A file has its own name, or its path if
+    another file has the same name.
     """
     paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
     parts = [[*path.parts[:-1], stem(path.name)] for path in paths]

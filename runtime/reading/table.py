@@ -23,7 +23,7 @@ class Options:
     Attributes
     ----------
     topic : str or None
-        Topic of a bag; None: the only one with sensor_msgs/JointState.
+        Topic of a bag; None: the only topic of the type sensor_msgs/JointState.
     decimal : str
         Decimal sign of a text file, "." or ",".
     """
@@ -176,7 +176,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """Return the array `name`, shape (N, k); InputError if it does not have N samples."""
+        """Return the array `name`, shape (N, k); raise InputError if it does not have N samples."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:
@@ -201,7 +201,7 @@ def is_numeric(x: Array) -> bool:
 def damage_named(title: str, file: str) -> Iterator[None]:
     """Turn errors of a file-reading library into InputError, for the duration of the block.
 
-    title : what the file should be, for the message.
+    title : kind of file that is expected, for the message.
     """
     try:
         yield

@@ -6,7 +6,7 @@ comment just above the numbers with one name for each column is the header, as n
 it. A first line such as `sep=;` is left out. Decimals have a point, or a comma if the settings say
 so. The text is UTF-8, or UTF-16 if it starts with the bytes ff fe or fe ff.
 
-The text of `ros2 topic echo --csv` is told by its first line (`runtime.reading.echoed`).
+The text of `ros2 topic echo --csv` is recognised by its first line (`runtime.reading.echoed`).
 
 NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
 other texts raises an error only if it is used, with the first line of such a text.
@@ -136,7 +136,7 @@ def _with_comments(path: Path) -> Lines:
 
 
 def _encoding(path: Path) -> str:
-    """Return the encoding of a text file: UTF-16 if it starts so, else UTF-8.
+    """Return the encoding of a text file: UTF-16 if its first bytes say so, else UTF-8.
 
     Raise InputError for a file whose first bytes are those of another kind of file.
     """

@@ -87,8 +87,8 @@ def apply(
 
 
 def copied_loops(model: Path, output: Path | None, force: bool) -> dict[Path, bytes]:
-    """Return the file with the loops of `model`, at the place where `output` needs it, if it lacks
-    it.
+    """Return the file with the loops of `model`, at the place where `output` needs this file, if it
+    is missing there.
     """
     from symgen.description.files import loops_beside
 

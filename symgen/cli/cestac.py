@@ -60,7 +60,7 @@ def cestac(
     """Study how coarser encoders change the estimate. The exit code is 1 if the estimate is biased
     at one of the encoder or torque steps.
 
-    With --advise, exit code 1 if the estimate would be biased at one of the steps of --delta, or if
+    With --advise, the exit code is 1 if the estimate would be biased at one of the steps of --delta, or if
     the runs contradict the prediction. --advise tries both readers of encoders,
     positions and counts; --reader lowpass alone is six times faster.
 

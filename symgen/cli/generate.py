@@ -27,7 +27,7 @@ def generate(
         typer.Argument(
             metavar="ROBOT...",
             help=(
-                "Packaged robots or robot files (.yaml, .par, .urdf, .xml, .mjcf); `all` for every packaged one."
+                "Packaged robots or robot files (.yaml, .par, .urdf, .xml, .mjcf); `all` means every packaged robot."
             ),
         ),
     ],

@@ -62,14 +62,14 @@ def identify(
     repair: Annotated[
         Path | None,
         typer.Option(
-            help="Search several errors of the study at once, judge them on rows that were not used, and write the mended study; then identify with it. The given files stay as they are."
+            help="Search for several errors of the study at once, judge the corrections on rows that the search did not use, and write the mended study; then identify with it. The given files stay as they are."
         ),
     ] = None,
     each: Annotated[
         bool,
         typer.Option(
             "--each",
-            help="Identify from each record alone, not from all together; the results of each are in a folder of FOLDER, and are kept if the command is repeated.",
+            help="Identify from each record alone, not from all together. Each record gets its own folder of results in FOLDER; existing results are kept if the command is repeated.",
         ),
     ] = False,
     workers: options.Workers = 0,

@@ -30,7 +30,7 @@ PANELS = {
         "apply": "Write identified values into your own URDF or MJCF.",
         "report": "Identify a robot from a record and judge the result on one page.",
         "compare": "Find which of several studies predicts best.",
-        "excite": "Search a motion that excites the parameters within the limits.",
+        "excite": "Search for a motion that excites the parameters within the limits.",
         "simulate": "Simulate the closed loop of a study file and write its record.",
     },
     "Encoder": {
@@ -146,7 +146,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Make sure that the file descriptors 0 to 2 are open, if need be on os.devnull.
+    """Make sure that the file descriptors 0 to 2 are open, by os.devnull if needed.
 
     Otherwise a file that the program opens could get the number of a closed stream, and receive the
     text that a library prints.

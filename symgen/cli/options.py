@@ -64,7 +64,7 @@ Base = Annotated[
     Text,
     typer.Option(
         "--base",
-        help="fixed, moving or free: whether frame 0 stands, is a body whose motion is measured, or one whose motion and wrench are measured. Default: that of the robot file.",
+        help="Base of the robot. fixed: frame 0 stands still. moving: the motion of frame 0 is measured. free: the motion of frame 0 and the wrench on it are measured. Default: the base in the robot file.",
     ),
 ]
 Trust = Annotated[
@@ -153,7 +153,7 @@ At = Annotated[
     Text,
     typer.Option(
         help="Link of the robot file at which mass, centre and inertia of the load of the study are given, "
-        "such as tool0. Default: tool0, flange or the last one."
+        "such as tool0. Default: tool0, flange or the last link that the load can be mounted on."
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

@@ -32,7 +32,7 @@ def report(
 ) -> None:
     """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and judge the result.
 
-    A part that cannot be done is named on the page with its reason. Exit code 1 if the values
+    A part that cannot be done is named on the page with its reason. The exit code is 1 if the values
     cannot be used.
 
     With --columns, only the named parameters decide whether the encoder is fine enough.

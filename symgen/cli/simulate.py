@@ -36,8 +36,8 @@ def simulate(
     """Simulate ROBOT under the controller of STUDY. Parameters are the values of the robot file, or
     those of `controller.values`.
 
-    The record is written as `identify` reads it, with the reference in columns qr1 ...; study.yaml
-    names it.
+    The simulated record is written in a form that `identify` reads, with the reference in the columns
+    qr1 ..., and study.yaml names this record.
     """
     with session.results_in(output) as results:
         import runtime

@@ -34,11 +34,14 @@ def studio(
         ),
     ] = Path("symgen-studio"),
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of this machine. Default: as the last time.")
+        int,
+        typer.Option(min=0, max=65535, help="Port of the server. Default: that of the last time."),
     ] = 0,
     renew: Annotated[
         bool,
-        typer.Option("--new-address", help="Take a new address; bookmarks of the old one end."),
+        typer.Option(
+            "--new-address", help="Use a new address; bookmarks of the old address no longer work."
+        ),
     ] = False,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")

@@ -71,7 +71,7 @@ def load_robot(
         an AngleWarning names the largest change, if it exceeds 1e-9 rad.
     base : str, optional
         `moving`: frame 0 is a body whose motion is measured; `free`: the wrench on this body is
-        measured too; `fixed`: it stands. Default: that of the file.
+        measured too; `fixed`: frame 0 stands still. Default: the base of the file.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def load_robot(
 
 
 def robot_of(robot: str | Path | Robot) -> Robot:
-    """Return a robot as it is, or that of a packaged name or a file.
+    """Return a Robot as it is, or load a packaged robot by name, or a robot file.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def robot_of(robot: str | Path | Robot) -> Robot:
 
 
 def on_base(robot: Robot, base: str | None) -> Robot:
-    """Return the robot with a fixed, moving or free base; None leaves that of the file."""
+    """Return the robot with a fixed, moving or free base; None keeps the base of the file."""
     if base is None:
         return robot
     if not isinstance(base, str) or base not in BASES:
@@ -262,8 +262,8 @@ def is_loops_file(name: str) -> bool:
 def loops_beside(path: Path) -> Any:
     """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
 
-    It is NAME.loops.yaml in the same folder, or loop_closures.yaml there; of a file in a folder
-    `urdf`, also in the folder that holds it, or in `config` there.
+    The file is NAME.loops.yaml or loop_closures.yaml in the same folder. For a robot file in a
+    folder `urdf`, it may also be in the parent folder, or in the folder `config` of that folder.
     """
     from symgen.description.loops_file import EXPORTED, LoopsText  # numpy
 
@@ -289,7 +289,7 @@ def write_robot(
     robot : Robot
         The robot to be written.
     file : str
-        Name of the file, with one of the suffixes WRITTEN.
+        Name of the file, with the suffix .yaml, .yml or .urdf.
     comments : sequence of str
         Comment lines at the top of a robot file (.yaml).
 
@@ -309,7 +309,7 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Return the content of a robot file as bytes, cut off after MAX_BYTES + 1 bytes.
+    """Return the content of a robot file as bytes, cut off just above the largest allowed size.
 
     Raises DescriptionError if the file cannot be read.
     """

@@ -238,9 +238,9 @@ def parse(
 ) -> Expression:
     """Parse an expression of a robot file, given as text or number, into an exact Expression.
 
-    `symbols` are the declared names (None: any name is allowed). `functions` is FUNCTIONS, or LAWS
-    for the law of a column. Raises ExpressionError, with the column, at the first text that is not
-    allowed.
+    `symbols` are the declared names (None: any name is allowed). `functions` are the allowed
+    functions: `FUNCTIONS`, or `LAWS` for the law of a column. Raises ExpressionError, with the
+    column, at the first text that is not allowed.
     """
     if isinstance(text, (int, float)) and not isinstance(text, bool):
         text = repr(text)

@@ -58,8 +58,8 @@ ESTIMATORS = {
 class Pages:
     """The request handlers of one studio server.
 
-    Handlers of GET answer with a page. Handlers of POST change something and return the name of the
-    part of the page to show again, that of another page, or "" for the whole page.
+    Handlers of GET answer with a page. Handlers of POST change data and return the name of the part
+    of the page to show again, the name of another page, or "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
@@ -307,7 +307,7 @@ class Pages:
             return
         value = await self.server.view(views.preview, str(part), {"topic": None, "joints": ()})
         if "error" in value:
-            raise InputError(f"{part.name[:80]}: {value['error']}; the record before stays")
+            raise InputError(f"{part.name[:80]}: {value['error']}; the earlier record stays in use")
 
     async def _earlier_record(self, form: dict[str, str]) -> str:
         self.folder.exchange_record()
@@ -382,14 +382,18 @@ class Pages:
         return "findings"
 
     def _of_the_study(self, title: str, program: str, *options: str) -> None:
-        """Queue a program of the studio that reads robot and study, and writes a file of its name."""
+        """Queue a program of the studio that reads robot and study, and writes a file named after
+        the program.
+        """
         robot, study = self._command()
         terminal = shlex.join(("symgen", "identify", robot, study, *options))
         result = f"{program}.json"
         self.jobs.add(title, (program, robot, study, result), result, terminal=terminal)
 
     def _repaired(self) -> dict[str, Any]:
-        """Return what the last repair has changed, or tried; {} if robot or study are others now."""
+        """Return the changes that the last repair has made or tried; {} if robot or study have
+        changed since.
+        """
         told = json_of(self.folder.path / "repair.json")
         now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
         return told if told.get("of") == now else {}

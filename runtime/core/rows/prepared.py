@@ -79,7 +79,7 @@ class Prepared:
     def channels(self) -> dict[str, Array]:
         """Recorded signals with one column, such as a temperature, by name, shape (N,) each.
 
-        The motion of a base that moves is among them, filtered.
+        The filtered motion of a base that moves is included.
         """
         given = self.record.channels
         own = {c: x[:, 0] for c, x in given.items() if c not in JOINT_CHANNELS and x.shape[1] == 1}
@@ -87,7 +87,7 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Used rows of the record: those selected, or chosen by time, decimation and speed."""
+        """Used rows of the record: the given selection, or a choice by time, decimation and speed."""
         if self.selected is not None:
             return self.selected
         return select_rows(self.record, self.states.qd, self.study.signals, self.study.rows)
@@ -98,7 +98,7 @@ class Prepared:
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """Return the used rows, without those of unknown state or uncertain friction direction."""
+        """Return the used rows, without rows of unknown state or uncertain friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(
@@ -135,7 +135,7 @@ class Prepared:
 
 
 def study_of_record(study: Study, record: Record) -> Study:
-    """Return the study with the cut-off of the record, if the record has one of its own."""
+    """Return the study with the cut-off of the record, if the record has a cut-off of its own."""
     low, own = study.signals.lowpass, record.origin.cutoff
     if low is None or own is None:
         return study
@@ -145,7 +145,7 @@ def study_of_record(study: Study, record: Record) -> Study:
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
     """Return the drives that all records have, or the drives of the model if there is no record.
 
-    InputError if the records were read with different couplings.
+    Raise InputError if the records were read with different couplings.
     """
     coupled = {own.drives.coupling for own in records if own.drives is not None}
     if len(coupled) > 1:
@@ -222,8 +222,8 @@ def certain(
 ) -> Selection:
     """Remove rows of unknown state, or of uncertain friction direction, from a selection of rows.
 
-    Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
-    zero speed. Without known errors of the velocities, the selection does not change.
+    A row removed because of missing positions is counted as "missing"; a row near zero speed, as
+    "direction". Without known errors of the velocities, the selection does not change.
     """
     if states.errors is None:
         return selection
@@ -243,7 +243,7 @@ def stacked(
 
     columns : names of the columns; default: all.
 
-    InputError if there is no record, or if W is larger than the memory.
+    Raise InputError if there is no record, or if W is larger than the memory.
     """
     if not records:
         raise InputError("no record is given; expected at least one")

@@ -1,9 +1,9 @@
 """Decimated columns of W: entries that are always zero are skipped, equal ones computed once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
-linear. Therefore only the distinct signals are filtered and then copied to their entries of W. They
-are evaluated in pieces of samples, by the operations of the module that they need
-(`runtime.core.rows.tape`), and decimated piece by piece: the signals are not stored.
+linear. Therefore only the distinct signals are filtered and then copied to their entries of W. The
+distinct signals are evaluated in pieces of samples, by the operations of the module that they need
+(`runtime.core.rows.tape`), and decimated piece by piece, so that they are never stored whole.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PROBES = 64  # random states that tell signals apart
 class Entries:
     """Table of the nonzero entries of the regressor, which marks entries that are equal up to sign.
 
-    Wanted store[row[m], j[m]] = sign[m] * signal[which[m]].
+    Nonzero entry m is store[row[m], j[m]] = sign[m] * signal[which[m]].
 
     place : row of each signal in the store, shape (b n, N).
     """
@@ -99,7 +99,7 @@ class Columns:
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
         """Yield the distinct entries of W, decimated, one slice of the kept samples at a time.
 
-        Their shape is (S, instants). Arrays are valid until the next ones are requested.
+        The shape is (S, instants). An array is valid until the next array is requested.
 
         plan : plan of the decimation; None keeps every sample.
         """
@@ -141,7 +141,7 @@ class Columns:
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
     """Return the recorded signals that the model needs, such as a temperature, by name, shape (N,).
 
-    InputError if the states lack one of them.
+    Raise InputError if the states lack one of these signals.
     """
     channels = channels_of(model)
     if missing := [c for c in channels if c not in states.channels]:
@@ -179,9 +179,9 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """Evaluate the regressor at PROBES random states, shape (b, n, PROBES).
+    """Evaluate the regressor at m random states, shape (b, n, m).
 
-    nan if a loop does not close at one of them.
+    The result is nan if a loop does not close at one of the states.
     """
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
