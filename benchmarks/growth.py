@@ -5,9 +5,9 @@ figure.
     python benchmarks/growth.py --trees [--joints 10 30 60 100]         # writes benchmarks/growth.md
 
 Samples: the TX40 regressor into a reused store and the distinct signals through the decimation;
-largest resident set of `symgen identify`. Joints: the trees of `trees.py`; `symgen show` and `symgen
-generate --target numpy` as processes, their processor seconds and largest resident set, and the size
-of each module. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
+largest resident set of `symgen identify`. Joints: the trees of `trees.py`; `symgen show`, and
+what `symgen generate` does by `stages.py`, as processes, their processor seconds and largest
+resident set; the size of each module, and its import without a compiled copy. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
 One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core,
 elapsed time. The least of three under an unknown load is good for slopes, which is what the figure
@@ -19,14 +19,13 @@ folder. The numbers of the figure are printed.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -50,8 +49,8 @@ from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 
 SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
-JOINTS = (10, 30, 60)
-STAGES = ("show, s", "generate, s", "generate, peak MB", "module, KB")
+JOINTS = (10, 30, 60, 100)
+SIZES = ("show, s", "generate, s", "generate, MB", "module, KB", "import, s")
 RUNS = (4, 16, 64, 256)
 COLUMNS = (3, 6, 12, 24, 60)
 WORKERS = (1, 2, 4, 8)  # as many as there are cores
@@ -103,11 +102,11 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
 
 
 def process(folder: Path, *arguments: str, codes: tuple[int, ...] = (0,)) -> tuple[float, float]:
-    """Processor seconds of a `symgen` command, and its largest resident set in MB; at least that of
+    """Processor seconds of a command of Python, and its largest resident set in MB; at least that of
     this process, which it inherits.
     """
     started = subprocess.Popen(
-        [sys.executable, "-m", "symgen", *arguments],
+        [sys.executable, *arguments],
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -115,7 +114,7 @@ def process(folder: Path, *arguments: str, codes: tuple[int, ...] = (0,)) -> tup
     _, status, used = os.wait4(started.pid, 0)
     started.returncode = os.waitstatus_to_exitcode(status)
     if started.returncode not in codes:
-        raise RuntimeError(f"symgen {' '.join(arguments)} ended with {started.returncode}")
+        raise RuntimeError(f"{' '.join(arguments)} ended with {started.returncode}")
     return used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6
 
 
@@ -133,7 +132,7 @@ def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Cur
         }
         np.savez(path, t=t, **named)
         _, peak = process(  # the verdict may be no
-            folder, "identify", "tx40", str(path), "--no-plausible", codes=(0, 1)
+            folder, "-m", "symgen", "identify", "tx40", str(path), "--no-plausible", codes=(0, 1)
         )
         found["identification"].append((N, peak))
         W = 8 * 6 * len(model.BASE_PARAMETERS) * N
@@ -146,58 +145,57 @@ def least_peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
-def by_joints(folder: Path, joints: tuple[int, ...]) -> dict[str, Curves]:
-    """Seconds and MB of commands, and KB of the module, of every tree."""
-    found: dict[str, Curves] = {name: {} for name in STAGES}
+def by_joints(folder: Path, joints: tuple[int, ...]) -> dict[str, dict[str, Curves]]:
+    """Seconds and MB of commands and of the stages of `generate`, {size: {shape: points}}."""
+    commands: dict[str, Curves] = {name: {} for name in SIZES}
+    stages: dict[str, Curves] = {}
+    stager = str(Path(__file__).with_name("stages.py"))
     for shape, written in TREES.items():
         for n in joints:
-            (folder / f"{shape}.yaml").write_bytes(written(n))
-            show, _ = process(folder, "show", f"{shape}.yaml")
-            seconds, peak = process(
-                folder, "generate", f"{shape}.yaml", "--target", "numpy", "-o", f"{shape}{n}"
-            )
-            (text,) = (folder / f"{shape}{n}").glob("*.py")
-            sizes = show, seconds, peak, text.stat().st_size / 1e3
-            for name, size in zip(STAGES, sizes, strict=True):
-                found[name].setdefault(shape, []).append((n, size))
+            out = folder / f"{shape}{n}"
+            out.mkdir()
+            (out / "robot.yaml").write_bytes(written(n))
+            show, _ = process(out, "-m", "symgen", "show", "robot.yaml")
+            seconds, peak = process(out, stager, "robot.yaml", "-o", ".")
+            size = (out / f"{shape}{n}.py").stat().st_size / 1e3
+            imported, _ = process(out, "-B", "-c", f"import {shape}{n}")
+            sizes = show, seconds, peak, size, imported
+            for name, x in zip(SIZES, sizes, strict=True):
+                commands[name].setdefault(shape, []).append((n, x))
+            for stage, spent in json.loads((out / "stages.json").read_text()).items():
+                for unit, x in zip(("s", "MB"), spent, strict=True):
+                    stages.setdefault(f"{stage}, {unit}", {}).setdefault(shape, []).append((n, x))
             print(shape, n, *(f"{x:.3g}" for x in sizes), flush=True)
-    return found
+    return {"commands": commands, "stages": stages}
 
 
-def table_of_trees(found: dict[str, Curves], load: str) -> str:
+def table(title: str, curves: Curves) -> list[str]:
+    """Rows of sizes by joints, and the exponent of the last two."""
+    joints = [n for n, _ in next(iter(curves.values()))]
+    lines = [f"| {title} | {' | '.join(f'{n:g}' for n in joints)} | exponent |"]
+    lines.append("|---|" + "---|" * (len(joints) + 1))
+    for name, points in curves.items():
+        sizes = " | ".join(f"{size:.3g}" for _, size in points)
+        told = f"{slope(points[-2:]):.2f}" if min(size for _, size in points[-2:]) > 0 else ""
+        lines.append(f"| {name} | {sizes} | {told} |")
+    return [*lines, ""]
+
+
+def table_of_trees(found: dict[str, dict[str, Curves]], load: str) -> str:
     """The page growth.md."""
     lines = [
         "# Growth with the joints",
         "",
-        "Written by `python benchmarks/growth.py --trees`, which says what is measured; the trees are those of `trees.py`.",
-        f"One run of each command, two virtual cores, load average {load}; a process shows at least the {least_peak():.0f} MB of the one that starts it.",
-        "Exponents are those of the two largest trees; the start of Python, some 0.3 s, is in all seconds.",
+        "Written by `python benchmarks/growth.py --trees`, which says what is measured; the trees are those of `trees.py`, the stages those of `stages.py`.",
+        f"One run of each, two virtual cores, load average {load}; a process shows at least the {least_peak():.0f} MB of the one that starts it.",
+        "Exponents are those of the two largest trees; the start of Python, some 0.3 s, is in all seconds of commands.",
         "",
-        f"| tree | joints | {' | '.join(STAGES)} |",
-        "|---|---|" + "---|" * len(STAGES),
     ]
     for shape in TREES:
-        columns = [found[name][shape] for name in STAGES]
-        for row in zip(*columns, strict=True):
-            sizes = " | ".join(f"{size:.3g}" for _, size in row)
-            lines.append(f"| {shape} | {row[0][0]:g} | {sizes} |")
-        exponents = " | ".join(f"{slope(points[-2:]):.2f}" for points in columns)
-        lines.append(f"| {shape} | exponent, last two | {exponents} |")
-    lines += ["", peer(), ""]
+        for kind, sizes in found.items():
+            title = shape if kind == "commands" else f"{shape}, stage of generate"
+            lines += table(title, {name: curves[shape] for name, curves in sizes.items()})
     return "\n".join(lines)
-
-
-def peer() -> str:
-    """Whether pinocchio can generate code of its regressor by CasADi here."""
-    version = metadata.version("pin") if find_spec("pinocchio") else None
-    if version is None:
-        return "pinocchio is not installed: no ratio to its code generation."
-    has = find_spec("pinocchio.casadi") is not None
-    return (
-        f"pinocchio {version} {'has' if has else 'has no'} module `pinocchio.casadi`"
-        f"{'; this file does not measure it' if has else ', so it generates no code of its regressor here'}:"
-        " no ratio."
-    )
 
 
 def study_record() -> Record:
@@ -343,8 +341,13 @@ def main() -> None:
             f"columns, {runs[-2]} runs, TX40",
             "CPU time of a resolution study, s",
         )
-        panel(axes[4], trees["generate, s"], "joints", "CPU time of symgen generate, s")
-        panel(axes[5], trees["generate, peak MB"], "joints", "peak memory of symgen generate, MB")
+        panel(axes[4], trees["commands"]["generate, s"], "joints", "CPU time of symgen generate, s")
+        panel(
+            axes[5],
+            trees["commands"]["generate, MB"],
+            "joints",
+            "peak memory of symgen generate, MB",
+        )
         os.sched_setaffinity(0, cores)
         elapsed = by_workers(models, record, workers, runs[-1])
         panel(

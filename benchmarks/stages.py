@@ -1,8 +1,8 @@
 """Processor seconds and peak memory of each stage of a generation with its certificate, as JSON.
 
-    python benchmarks/stages.py humanoid30.yaml [--target numpy] [--root CHECKOUT]
+    python benchmarks/stages.py humanoid30.yaml [--target numpy] [-o FOLDER] [--root CHECKOUT]
 
-prints {stage: [seconds, MB]}. A stage is one function of STAGES without the stages that it calls;
+writes the files, and {stage: [seconds, MB]} as stages.json. A stage is one function of STAGES without the stages that it calls;
 `other` is all else. The peak of a stage is the largest resident set of the process, Python and its
 packages included, while the stage runs; Linux sets it back when a stage begins. `--root` measures
 another checkout of symgen, such as an older commit. The seconds of compilers count, their memory
@@ -20,7 +20,6 @@ from functools import wraps
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 STAGES: dict[str, Sequence[str]] = {  # of several names, those that the checkout has
@@ -94,34 +93,31 @@ def watch(clock: Clock) -> None:
                         setattr(other, key, timed)
 
 
-def measured(path: Path, targets: tuple[str, ...]) -> dict[str, list[float]]:
-    """Seconds and MB by stage of the generation of a robot file."""
-    from symgen.certify import modules
-    from symgen.description import load_robot
-
-    with TemporaryDirectory() as cache:
-        modules.stored_path = lambda file, text: Path(cache) / file  # type: ignore[assignment]
-        robot, clock = load_robot(str(path)), Clock()
-        watch(clock)
-        clock.turn()
-        modules.certified_files(robot, targets=targets)
-        clock.turn()
-    return clock.found
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("robot", type=Path)
     parser.add_argument("--target", default="numpy")
+    parser.add_argument("-o", "--output", type=Path, default=Path("generated"))
     parser.add_argument("--root", type=Path, default=Path(__file__).parents[1])
     arguments = parser.parse_args()
     sys.path.insert(0, str(arguments.root))
-    for module in ("symgen.cli.generate", "symgen.certify.modules", "symgen.emit.generate"):
-        import_module(module)
-    found = measured(arguments.robot.resolve(), tuple(arguments.target.split(",")))
-    print(json.dumps(found))
+    clock = Clock()
+    modules = import_module("symgen.certify.modules")
+    load_robot = import_module("symgen.description").load_robot
+    arguments.output.mkdir(exist_ok=True)
+    modules.stored_path = lambda file, text: arguments.output / file  # not into the cache
+    watch(clock)
+    files = modules.certified_files(
+        load_robot(str(arguments.robot)), targets=tuple(arguments.target.split(","))
+    )
+    for file, text in files.items():
+        (arguments.output / file).write_text(text, encoding="utf-8")
+    clock.turn()
+    found = json.dumps(clock.found)
+    (arguments.output / "stages.json").write_text(found, encoding="utf-8")
+    print(found)
 
 
 if __name__ == "__main__":
