@@ -104,14 +104,19 @@ class Case:
         """List the labels of the joints that the mask `chosen` selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
-    def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
+    def reaching(
+        self, values: Array, units: Sequence[str], chosen: Array, limits: Array | None = None
+    ) -> str:
         """Write the values that the selected joints reach, such as "Largest values: 3 rad (joint 2)".
 
-        At most four joints are named. If the mask selects none, the joint with the largest value is
-        named.
+        At most four joints are named, with their limits: "(joint 2, limit 1)". If the mask selects
+        none, the joint with the largest value is named, without its limit.
         """
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
-        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
+        limit = [""] * len(values)
+        if limits is not None and chosen.any():
+            limit = [f", limit {x:.3g}" for x in limits]
+        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]}{limit[j]})" for j in shown)
         return f"Largest values: {', '.join(each)}"
 
     @cached_property
