@@ -195,7 +195,7 @@ def _reading(
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
         part, read, left = read_stretch(counts[begin:end], rate, gaps.rest(counts), ahead)
         unknown[first:stop] = left[kept]
-        gaps.take(counts[first:stop], left[kept])
+        gaps.update(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
             x[first:stop] = own[kept]
         if part is not None:
@@ -296,7 +296,7 @@ class Gaps:
         first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
         return np.where(np.isnan(self.last), first, self.last)
 
-    def take(self, counts: Array, unknown: Array) -> None:
+    def update(self, counts: Array, unknown: Array) -> None:
         """Update the statistics of missing samples with the next counts of the record.
 
         Both arrays have shape (B, n); `unknown` marks the samples with unknown state.

@@ -181,8 +181,8 @@ def _assumed(model: GeneratedModel, qd: Array, records: Sequence[Record]) -> tup
     more = f", and the largest of the record for joint {', '.join(joints)}" if joints else ""
     line = ", ".join(f"{x:g}" for x in qdd)
     return qdd, (
-        f"No file limits the accelerations; the limits are the velocities reached in "
-        f"{LIMIT.RISE_TIME:g} s{more}. This line of the study file changes them: "
+        f"Neither robot file nor study limits the accelerations; symgen takes those that reach the "
+        f"largest velocity in {LIMIT.RISE_TIME:g} s{more}. This line of the study file changes them: "
         f"excitation: {{limits: {{qdd: [{line}]}}}}"
     )
 

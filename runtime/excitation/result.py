@@ -184,7 +184,7 @@ class Excitation(Result):
         )
         return (
             f" This motion determines {len(before) - len(worse)} of {len(before)} parameters "
-            f"better than the motion of the record, and WORSE: {named}{more}."
+            f"better than the motion of the record. It determines these WORSE: {named}{more}."
         )
 
     @property
@@ -222,7 +222,7 @@ class Excitation(Result):
             else "the limits of position, velocity and acceleration"
         )
         return (
-            f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) "
+            f"The motion takes {self.motion.duration:.1f} s, keeps {kept}, and has weighted cond(W) "
             f"{self.condition:.1f}{of_record}; "
             f"{self._least_certain}.{self.comparison}{self._bare}{self.torques} {self.not_judged}"
         )

@@ -22,7 +22,7 @@ LIMIT = limits(__package__)
 Array = np.ndarray
 
 
-def towards(g: Array, a: float, b: float) -> Array:
+def turned_gravity(g: Array, a: float, b: float) -> Array:
     """Turn gravity g, shape (3,), by two small angles; its magnitude stays."""
     size = float(np.linalg.norm(g))
     e = g / size
@@ -73,7 +73,7 @@ def tilted(reading: Reading) -> Cause | None:
         a, b = np.clip(step[0], -0.5, 0.5)
         better = None
         for share in (1.0, 0.3):
-            new = towards(g, share * a, share * b)
+            new = turned_gravity(g, share * a, share * b)
             other = reading.changed(along(new, n, first))
             if (
                 other is not None
@@ -102,7 +102,7 @@ def _start(reading: Reading, first: Array) -> tuple[Array, Reading]:
     """
     best = first, reading
     for a, b in ((0.4, 0.0), (-0.4, 0.0), (0.0, 0.4), (0.0, -0.4)):
-        g = towards(first, a, b)
+        g = turned_gravity(first, a, b)
         other = reading.changed(along(g, len(reading.p), first))
         if other is None or other.baseline is None or best[1].baseline is None:
             continue
@@ -113,5 +113,5 @@ def _start(reading: Reading, first: Array) -> tuple[Array, Reading]:
 
 def _turned(g: Array, n: int, k: int, xi: float) -> Cause:
     """Make the cause (possible error) that gravity is turned by the angle xi about one of two axes."""
-    g = towards(g, *(xi, 0.0) if k == 0 else (0.0, xi))
+    g = turned_gravity(g, *(xi, 0.0) if k == 0 else (0.0, xi))
     return unchanged_study(n, constants=dict(zip(GRAVITY, map(float, g), strict=True)))

@@ -223,10 +223,10 @@ def nearest_standard(
     space = solutions(physical.rows(names), X, units(physical))
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
     criterion = np.diag(1 / scale), chi0 / scale
-    return nearest_in(space, physical, rows, start, criterion)
+    return nearest_physical(space, physical, rows, start, criterion)
 
 
-def nearest_in(
+def nearest_physical(
     space: Space,
     physical: PhysicalModel,
     rows: LinearBounds,

@@ -39,7 +39,7 @@ import numpy as np
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
 from symgen.derive.closure import parts
-from symgen.derive.constants import kept_angle, numbered, roots_of, rows_of, units_of
+from symgen.derive.constants import numbered, roots_of, rows_of, symbolic_angle, units_of
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
@@ -395,7 +395,7 @@ def degree(regrouping: Regrouping) -> int:
     units = units_of(numbered(robot))
 
     def angle(e: Expression) -> int:
-        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(kept_angle(e))[1]))
+        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(symbolic_angle(e))[1]))
 
     def constant(e: Expression) -> int:
         return max((sum(abs(n) * atom(a) for a, n in m) for m in e.terms), default=0)

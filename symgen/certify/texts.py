@@ -233,7 +233,7 @@ def module_errors(
                 if text:
                     raised[name] = f"{text} ({how})"
                 elif how == CASADI and not any(c.keywords for c in checks):
-                    _share(module, name)
+                    _share_graph(module, name)
         if not witness.tied:
             try:
                 errors[DERIVATIVES] = _derivative_error(module, witness)
@@ -368,7 +368,7 @@ def _restored(module: ModuleType) -> Iterator[None]:
         vars(module).update(own)
 
 
-def _share(module: ModuleType, name: str) -> None:
+def _share_graph(module: ModuleType, name: str) -> None:
     """Let a checked function of CasADi take the place of the module's function `name`.
 
     Other functions that call `name` then share its expression graph and do not run its text again;

@@ -414,7 +414,7 @@ def stopped(kept: str) -> NoReturn:
 def progress_lines() -> Iterator[None]:
     """Print one line for each stage of long work for the duration of the block.
 
-    Lines are printed on the error stream, after the first two seconds.
+    Lines are printed on the error stream, after the first two seconds, and equal lines only once.
     """
     import logging
     from time import monotonic
@@ -422,8 +422,12 @@ def progress_lines() -> Iterator[None]:
     from runtime.ground.progress import LOGGER
 
     class Stages(logging.Handler):
+        last = ""
+
         def emit(self, record: logging.LogRecord) -> None:
-            say(record.getMessage())
+            if record.getMessage() != self.last:
+                self.last = record.getMessage()
+                say(self.last)
 
     start, level = monotonic(), LOGGER.level
     handler = Stages()

@@ -208,10 +208,10 @@ def numbered(robot: Robot) -> Robot:
     """
     followed = {a for e in robot.constraints.values() for a in e.atoms}
     chained = any(f"q{j}" in followed for j in robot.constraints)
-    result = mapped(robot, keep_rationals, kept_angle)
+    result = mapped(robot, keep_rationals, symbolic_angle)
     if not chained:
         return result
-    return replace(result, constraints={j: kept_angle(e) for j, e in robot.constraints.items()})
+    return replace(result, constraints={j: symbolic_angle(e) for j, e in robot.constraints.items()})
 
 
 def keep_rationals(e: Expression) -> Expression:
@@ -236,7 +236,7 @@ def keep_rationals(e: Expression) -> Expression:
     return total
 
 
-def kept_angle(e: Expression) -> Expression:
+def symbolic_angle(e: Expression) -> Expression:
     """Replace decimal numbers in an angle, and fractions with a large denominator, by symbols.
 
     Quarter turns and the multiples of a joint angle stay numbers.

@@ -141,7 +141,9 @@ def notes(model: SymbolicModel) -> list[str]:
     if source.given:
         lines.append("With " + ", ".join(f"{name} = {e}" for name, e in source.given.items()) + ".")
     if model.model.axes:
-        symmetric = ", those below the diagonal are those above it" if model.model.symmetric else ""
+        symmetric = (
+            "; entries below the diagonal equal those above" if model.model.symmetric else ""
+        )
         lines.append(f"Entries that are not shown are zero{symmetric}.")
     if model.model.denominator:
         lines.append(f"Each entry is to be divided by {model.model.denominator}, the last line.")

@@ -34,7 +34,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.ground.limits import limits
-from runtime.physical.feasibility import blocked, feasibility, limit_rows, nearest_in, scales, units
+from runtime.physical.feasibility import (
+    blocked,
+    feasibility,
+    limit_rows,
+    nearest_physical,
+    scales,
+    units,
+)
 from runtime.physical.inertia import INERTIAL, PhysicalModel
 from runtime.physical.semidefinite import LinearBounds, Space, margin, solutions, within
 from symgen.description.tree import Array
@@ -426,7 +433,7 @@ def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> A
         W, w = _linear(part, u)
         space = _holding(part, K, rest, u, held)
         criterion = W / part.ease[:, None], w / part.ease
-        chi = nearest_in(space, part.physical, rows, start, criterion)
+        chi = nearest_physical(space, part.physical, rows, start, criterion)
         before, u = u, _numbers(part, chi)
         if (far := float(np.linalg.norm((u - part.u0) / S))) < distance:
             distance, best = far, u
