@@ -8,39 +8,23 @@ are evaluated in pieces of samples, by the operations of the module that they ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from runtime.core.model import GeneratedModel, channels_of
 from runtime.core.rows.observation import column_numbers
+from runtime.core.rows.streamed import Entries
 from runtime.core.rows.tape import Tape, recorded
-from runtime.core.signals.decimation import PIECE, Plan, decimated_parts
+from runtime.core.signals.decimation import PIECE, Plan, copy_overlap, decimated_parts
 from runtime.core.signals.filters import States
 from runtime.ground.errors import InputError
 
 Array = np.ndarray
 
 PROBES = 64  # random states that tell signals apart
-
-
-@dataclass(frozen=True, eq=False)
-class Entries:
-    """Table of the nonzero entries of the regressor, which marks entries that are equal up to sign.
-
-    Wanted store[row[m], j[m]] = sign[m] * signal[which[m]].
-
-    place : row of each signal in the store, shape (b n, N).
-    """
-
-    row: Array
-    j: Array
-    which: Array
-    sign: Array
-    place: Array
 
 
 class Columns:
@@ -95,6 +79,25 @@ class Columns:
                     entries.sign[:, None] * values
                 )
         return store
+
+    def read(
+        self, states: States, plan: Plan | None, instants: slice
+    ) -> Callable[[int, int], Array]:
+        """Return a function that gives the distinct entries of W at the instants [a, b).
+
+        The parameters are those of `decimated`; the instants count from the first of `instants`.
+        Decimated entries are kept, those of every sample are computed when they are asked for.
+        """
+        first, last, _ = instants.indices(len(states) if plan is None else plan.K)
+        if plan is None:
+            return partial(self._between, states[first:last])
+        kept = np.empty((len(self.entries.place), last - first))
+        for part, signals in self.signals(states, plan):
+            copy_overlap(signals, part.start, kept, first)
+        return lambda a, b: kept[:, a:b]
+
+    def _between(self, states: States, a: int, b: int) -> Array:
+        return self._evaluated(states[a:b])
 
     def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
         """Yield the distinct entries of W, decimated, one slice of the kept samples at a time.
