@@ -380,6 +380,17 @@ def problem(
     ------
     InputError
         A record, model or setting that a step cannot use.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> prepared = runtime.problem(model, record)
+    >>> prepared.settings.signals.lowpass.cutoff  # Hz, which the study leaves to the program
+    10.0
     """
     return prepared(state_problem(model, records, study, unseen, simulator), STEPS)
 
@@ -427,6 +438,16 @@ def read_record(
     InputError
         Files that cannot be read or have other content, several records, or one record that
         `resample` splits.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import runtime
+    >>> rows = [f"{k / 100}, {k % 7}, {k % 5}" for k in range(20)]
+    >>> _ = Path("run.csv").write_text("\\n".join(["t, q1, tau1", *rows]))
+    >>> record = runtime.read_record("run.csv")
+    >>> record.name, record.q.shape, round(record.rate)
+    ('run', (20, 1), 100)
     """
     bare, folder = False, folder or "."
     if isinstance(path, RecordSettings):
@@ -460,6 +481,19 @@ def observe(
     """Build the rows Y = W X + rho of one or several records, eqs. (6) and (14) of the chapter.
 
     The study specifies filters, decimation and selection of rows.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> observation = runtime.observe(model, record)
+    >>> observation.names
+    ('M1R', 'FV1', 'FS1', 'OFFSET1')
+    >>> observation.W.shape, observation.Y.shape
+    ((229, 4), (229,))
     """
     return observe_rows(problem(model, records, study, simulator=simulator))
 
@@ -496,6 +530,19 @@ def estimate(
         Records that give no row.
     SettingsError
         A method that needs settings or data that the study or the records lack.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> estimate = runtime.estimate(model, record)
+    >>> estimate.names
+    ('M1R', 'FV1', 'FS1', 'OFFSET1')
+    >>> estimate.X.round(1)
+    array([ 95., 200.,  20.,   0.])
     """
     whole = problem(model, records, study, simulator=simulator)
     return estimated(whole, observe_rows(whole), provenance=whole.provenance)
@@ -532,6 +579,16 @@ def essential(
 
     The method of the study is used; a method that is not linear is replaced by least squares with
     the same weights.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> runtime.essential(model, record).names
+    ('M1R', 'FV1', 'FS1')
     """
     whole = problem(model, records, study, simulator=simulator)
     return essential_of(
@@ -596,6 +653,20 @@ def identify(
     ------
     InputError
         A record, setting or requested analysis that does not suit the others.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> result = runtime.identify(model, record)
+    >>> estimate = result.estimate
+    >>> dict(zip(estimate.names, estimate.X.round(1).tolist(), strict=True))
+    {'M1R': 95.0, 'FV1': 200.0, 'FS1': 20.0, 'OFFSET1': 0.0}
+    >>> print(result.verdict)
+    The model of emps with 4 of 4 parameters leaves 0.0 % of the torques ...
     """
     asked: dict[str, Mapping[str, Any]] = {}
     if physical:
@@ -668,6 +739,18 @@ def compare(
     InputError
         No candidate; one without validation records, or with other validation records than the
         first; no candidate that can be identified.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> studies = {name: runtime.Study(estimate={"method": name}) for name in ("ols", "irls")}
+    >>> given = {name: (study, record, record) for name, study in studies.items()}
+    >>> sorted(runtime.compare(model, given).results)
+    ['irls', 'ols']
     """
     from runtime import treatments as comparing
 
@@ -695,6 +778,18 @@ def cestac(
     map : like the built-in map; makes the runs, in processes
         (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md).
     options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> study = runtime.Study(cestac={"delta": [0.0001, 0.002]})  # m
+    >>> result = runtime.cestac(model, record, study)
+    >>> [level.verdict for level in result.levels]
+    ['unbiased', 'biased']
     """
     from runtime.core.cestac import cestac as resolution
 
@@ -722,6 +817,18 @@ def advise(
         encoders if study.cestac.rounding is phase, otherwise none.
     options : columns, asked, encoders, confirm, progress, provenance, as of
         `runtime.advisor.advisor.advise`.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> for limit in runtime.advise(model, record).encoders[0].limits:
+    ...     print(f"{limit.parameter} changes by {limit.percent:g} % at {limit.delta:.2g} m")
+    M1R changes by 1 % at 0.00044 m
+    M1R changes by 5 % at 0.001 m
     """
     from runtime.advisor import advisor
 
@@ -746,6 +853,18 @@ def plausibility(
     """Check whether record, study and robot file agree with each other.
 
     Also search for single changes of study or robot file that explain the record better.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> reversed = runtime.Record(t, q, -record.tau)
+    >>> result = runtime.plausibility(model, reversed)
+    >>> [trial.cause.says for trial in result.named]
+    ['the torque of joint 1 has the wrong sign', 'the position of joint 1 has the wrong sign']
     """
     from runtime.plausible import plausibility as checks
 
@@ -760,6 +879,16 @@ def delay(
     """Estimate the time shift between positions and torques of a record, joint by joint.
 
     options : longest, the largest delay that is searched, s.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model, t = symgen.model("emps"), np.arange(0, 10, 0.001)
+    >>> q, qd = np.sin(t) + np.sin(3 * t) / 3, np.cos(t) + np.cos(3 * t)
+    >>> qdd = -np.sin(t) - 3 * np.sin(3 * t)
+    >>> tau = np.roll(95 * qdd + 200 * qd + 20 * np.sign(qd), 8)  # 8 ms late
+    >>> round(runtime.delay(model, runtime.Record(t, q, tau)).common, 3)
+    0.008
     """
     from runtime.plausible import delay as delays
 
@@ -794,6 +923,16 @@ def excite(
 
     The best motion over all starts of the search is returned. Without records, the values of the
     robot file serve as parameters.
+
+    Examples
+    --------
+    >>> import runtime, symgen
+    >>> part = {"family": "fourier", "period": 5, "harmonics": 3}
+    >>> study = runtime.Study(excitation={"parts": [part], "starts": 1, "iterations": 5, "rate": 200})
+    >>> motion = runtime.excite(symgen.model("planar_2r"), study=study)
+    >>> t, q, qd, qdd, tau = motion.sampled()
+    >>> q.shape
+    (1001, 2)
     """
     from runtime.excitation import search
 
@@ -809,6 +948,16 @@ def static_poses(
 
     study.excitation.poses is the number of new poses, default 20. All poses respect the limits of
     q.
+
+    Examples
+    --------
+    >>> import runtime, symgen
+    >>> study = runtime.Study(excitation={"poses": 3})
+    >>> result = runtime.static_poses(symgen.model("planar_2r"), study=study)
+    >>> result.poses.shape
+    (3, 2)
+    >>> list(result.sigma)
+    ['MX1R', 'MY1', 'OFFSET1', 'MX2', 'MY2', 'OFFSET2']
     """
     from runtime.excitation import poses
 
@@ -855,6 +1004,20 @@ def repair(
     ------
     InputError
         Broken records: gaps, jumps, cut torques, two publishers.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> reversed = runtime.Record(t, q, -record.tau)
+    >>> result = runtime.repair(model, reversed)
+    >>> [change.says for change in result.changes]
+    ['the torque of joint 1 has the wrong sign']
+    >>> result.study.record[0].scale.tau
+    -1.0
     """
     from runtime.mending import repair as repairing
 
@@ -915,6 +1078,18 @@ def simulate(
         No section `controller`, or a reference outside the limits of the robot.
     SimulationError
         An inertia matrix that is not positive definite, or a loop that is not stable.
+
+    Examples
+    --------
+    >>> import runtime, symgen
+    >>> loop = {
+    ...     "law": {"kind": "pid", "kp": [4000, 400], "kd": [200, 20]},
+    ...     "reference": {"points": {"duration": 2}},
+    ... }
+    >>> study = runtime.Study(controller=loop)
+    >>> result = runtime.simulate(symgen.model("planar_2r"), study, ideal=True)
+    >>> bool(abs(result.q - result.q_r).max() < 0.03)  # rad
+    True
     """
     from runtime.loop import simulation
 

@@ -67,6 +67,17 @@ def report(
     ------
     OutputError
         The folder cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime, symgen
+    >>> model = symgen.model("emps")  # one prismatic joint
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> files = runtime.report(runtime.identify(model, record), "results")
+    >>> [file.name for file in files if file.suffix in (".html", ".json")]
+    ['report.html', 'estimate.json']
     """
     require_kind(folder, (str, Path, Results), "folder", "the name of a folder")
     require_kind(study, (Study, type(None)), "study", "a Study, or None")

@@ -87,6 +87,13 @@ class Study(chapter.Study, Recorded):
         Search for an exciting motion.
     robot : Corrections or None
         Entries that replace those of the robot file.
+
+    Examples
+    --------
+    >>> import runtime
+    >>> study = runtime.Study(estimate={"method": "wls"}, signals={"lowpass": {"cutoff": 8}})
+    >>> study.signals.lowpass.cutoff
+    8.0
     """
 
     signals: Signals = field(default_factory=Signals)
@@ -148,6 +155,14 @@ def load_study(path: str | Path) -> Study:
     """Read a study file and return its settings as a Study.
 
     An invalid file raises SettingsError with file, line and key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import runtime
+    >>> _ = Path("study.yaml").write_text("symgen: 1\\nestimate: {method: wls}\\n")
+    >>> runtime.load_study("study.yaml").estimate.method
+    'wls'
     """
     require_kind(path, (str, Path), "study", "the name of a study file")
     return study_from_text(text_of(path), file=Path(path).name)

@@ -14,9 +14,9 @@ from reference import table
 WIDTH = 100  # of a signature on one line
 
 
-def described_in_full(value: Any) -> Iterator[str]:
-    """Signature, docstring and, of a class, its methods and properties."""
-    yield f"```text\n{signature(value)}\n```"
+def described_in_full(public: str, value: Any) -> Iterator[str]:
+    """Signature under the public name, docstring and, of a class, its methods and properties."""
+    yield f"```text\n{signature(public, value)}\n```"
     yield markdown(value.__doc__)
     if inspect.isclass(value):
         methods = [
@@ -42,30 +42,23 @@ def described_method(name: str, member: Any) -> str:
         return ""
     kind = "class method " if isinstance(member, classmethod) else ""
     return (
-        f"- {kind}`{arguments(function, bound=not isinstance(member, staticmethod))}`: "
+        f"- {kind}`{arguments(name, function, bound=not isinstance(member, staticmethod))}`: "
         f"{first_sentence(function.__doc__)}"
     )
 
 
-def signature(value: Any) -> str:
+def signature(name: str, value: Any) -> str:
     """The call, on one line or one parameter a line."""
     prefix = "class " if inspect.isclass(value) else ""
-    line = prefix + arguments(value)
+    line = prefix + arguments(name, value)
     if len(line) <= WIDTH:
         return line
     inner = parameters(value)
-    return (
-        prefix
-        + value.__name__
-        + "(\n"
-        + "".join(f"    {p},\n" for p in inner)
-        + ")"
-        + returned(value)
-    )
+    return prefix + name + "(\n" + "".join(f"    {p},\n" for p in inner) + ")" + returned(value)
 
 
-def arguments(value: Any, *, bound: bool = False) -> str:
-    return f"{value.__name__}({', '.join(parameters(value)[bound:])}){returned(value)}"
+def arguments(name: str, value: Any, *, bound: bool = False) -> str:
+    return f"{name}({', '.join(parameters(value)[bound:])}){returned(value)}"
 
 
 def parameters(value: Any) -> list[str]:
@@ -124,5 +117,5 @@ def names(package: str) -> str:
         thing = getattr(parent, name)
         link = f"[`{name}`](#{name.lower()})" if callable(thing) else f"`{name}`"
         rows.append((link, first_sentence(thing.__doc__)))
-        parts += [f"### `{name}`", *described_in_full(thing)]
+        parts += [f"### `{name}`", *described_in_full(name, thing)]
     return "\n\n".join(part for part in [table(("name", ""), rows).strip(), *parts] if part) + "\n"

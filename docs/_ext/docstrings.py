@@ -76,7 +76,7 @@ def bullet(names: str, kind: str, meaning: str) -> str:
 
 
 def paragraphs(lines: Sequence[str]) -> list[list[str]]:
-    """Split at blank lines, and where the indentation begins or ends."""
+    """Split at blank lines, and where the indentation begins or ends; an example stays whole."""
     found: list[list[str]] = [[]]
     for line in lines:
         if not line.strip():
@@ -84,6 +84,7 @@ def paragraphs(lines: Sequence[str]) -> list[list[str]]:
         elif (
             found[-1]
             and indented(line) != indented(found[-1][-1])
+            and not found[-1][0].startswith(">>> ")
             and not ENTRY.match(found[-1][0])
             and not LIST.match(found[-1][0])
         ):
@@ -98,9 +99,13 @@ def indented(line: str) -> bool:
 
 
 def paragraph(lines: Sequence[str]) -> str:
-    """Prose, a list of entries (several on a line apart by blanks), or a block that stays."""
+    """Prose, a list of entries (several on a line apart by blanks), an example, or a block that
+    stays.
+    """
     if indented(lines[0]):
         return "\n".join(["```text", *(line[4:] for line in lines), "```"])
+    if lines[0].startswith(">>> "):
+        return "\n".join(["```pycon", *lines, "```"])
     if not ENTRY.match(lines[0]):
         return "\n".join(
             "\\" + line if line[:2] in ("+ ", "# ", "> ") else line for line in map(text, lines)

@@ -113,6 +113,15 @@ def load_model(
     ------
     ModelError
         There is no such file, it was not emitted here, or it is not a model.
+
+    Examples
+    --------
+    >>> import runtime
+    >>> tx40 = runtime.load_model("tx40")  # generated/tx40.py
+    >>> len(tx40.BASE_PARAMETERS)
+    60
+    >>> tx40.FORMULAS["XZ2R"]
+    'XZ2 - D3*MZ3'
     """
     require_kind(folder, (str, Path, type(None)), "folder", "the name of a folder")
     require_kind(trust, bool, "trust", "True or False")

@@ -132,6 +132,15 @@ class Record:
     InputError
         Shapes that differ, numbers that are not finite, fewer than 10 samples, or a clock that runs
         back, is not uniform or contradicts `rate`.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = np.sin(t), np.cos(t), -np.sin(t)
+    >>> record = runtime.Record(t, q, tau=95 * qdd + 200 * qd + 20 * np.sign(qd))
+    >>> record.tau.shape, round(record.rate)
+    ((10000, 1), 1000)
     """
 
     t: Array

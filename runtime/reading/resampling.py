@@ -85,6 +85,15 @@ def resample(
     InputError
         Time that goes back, a longer gap, a rate below that of the record, or numbers that are not
         finite.
+
+    Examples
+    --------
+    >>> import numpy as np, runtime
+    >>> k = np.arange(20)
+    >>> stamps = k + 0.1 * np.sin(k)
+    >>> t, x = runtime.resample(stamps, 3 * stamps, rate=2)
+    >>> t[:4], x[:4].round(6)
+    (array([0. , 0.5, 1. , 1.5]), array([0. , 1.5, 3. , 4.5]))
     """
     t, x = real(t, "t"), real(x, "x")
     if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < LIMIT.FEWEST_SAMPLES:

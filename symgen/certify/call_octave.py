@@ -42,6 +42,9 @@ function x = packed(x)
   end
   x = [ndims(x), size(x), double(x(:)).'];
 end
+sighup_dumps_octave_core(false);
+sigquit_dumps_octave_core(false);
+sigterm_dumps_octave_core(false);
 while true
   folder = fgetl(stdin);
   if ~ischar(folder)
@@ -83,7 +86,8 @@ while true
   fflush(stdout);
 end
 """
-"""Reads a folder from the standard input, calls what its file calls.bin says, and says when it is done."""
+"""Reads a folder from the standard input, calls what its file calls.bin says, and says when it is done;
+leaves no file octave-workspace if a signal ends it."""
 
 
 class Call(NamedTuple):

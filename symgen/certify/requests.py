@@ -60,6 +60,19 @@ def model(
         The file cannot be read or describes no robot.
     CertificateError
         The certificate does not hold.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> arm = symgen.model("planar_2r")
+    >>> arm.FORMULAS["ZZ1R"]
+    'ZZ1 + Ia1 + D2**2*M2'
+    >>> X = arm.base_parameters(arm.VALUES)  # of the values in the robot file
+    >>> q, qd, qdd = [0.5, 0.2], [0, 0], [0, 0]
+    >>> arm.inverse_dynamics(q, qd, qdd, X).round(3)
+    array([16.765,  3.702])
+    >>> (arm.regressor(q, qd, qdd) @ X).round(3)
+    array([16.765,  3.702])
     """
 
     def derived(robot: Robot) -> Path:

@@ -50,6 +50,16 @@ def variants(robot: str | Path | Robot, *, base: str | None = None) -> ModuleTyp
         The constants of the robot file, and free_alpha1, free_d1, free_theta1, free_r1 ... (gamma
         and b if a frame has them), free_gx, free_gy, free_gz. Their defaults are the values in the
         robot file. No function reads gravity on a base that moves, whose a0 has it.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> free = symgen.variants("planar_2r")
+    >>> X = free.base_parameters(free.VALUES)
+    >>> free.gravity([0.5, 0.2], X).round(3)
+    array([16.765,  3.702])
+    >>> free.gravity([0.5, 0.2], X, free_gy=0.0).round(3)  # the offsets are left
+    array([ 0.1 , -0.05])
     """
 
     def derived(robot: Robot) -> Path:

@@ -42,6 +42,13 @@ def corrected(robot: str | Path | Robot, study: Any) -> Robot:
     ------
     DescriptionError
         An entry that no robot file may have; the message names it.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> on_floor = symgen.corrected("planar_2r", {"gravity": [0, 0, 0]})
+    >>> len(symgen.regrouping("planar_2r")), len(symgen.regrouping(on_floor))
+    (13, 11)
     """
     robot = robot_of(robot)
     if not (study is None or isinstance(study, Mapping) or hasattr(study, "robot")):

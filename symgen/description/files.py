@@ -33,7 +33,14 @@ UNREAD = {
 
 
 def packaged_robots() -> tuple[str, ...]:
-    """List the names of the packaged robots, which `load_robot` accepts in place of a path."""
+    """List the names of the packaged robots, which `load_robot` accepts in place of a path.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> "tx40" in symgen.packaged_robots()
+    True
+    """
     folder = resources.files("symgen.description") / "robots"
     return tuple(
         sorted(
@@ -75,6 +82,15 @@ def load_robot(
     ------
     DescriptionError
         The file cannot be read or describes no robot; the message names file and line.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> robot = symgen.load_robot("tx40")
+    >>> robot.title
+    'Stäubli TX40, 6 revolute joints'
+    >>> len(robot.joints), len(robot.parameters)
+    (6, 86)
     """
     return on_base(read_robot(source, keep_fixed=keep_fixed, exact=exact)[0], base)
 

@@ -77,7 +77,18 @@ _YAML_ADVICE = {  # what the scanner says: what to change
 
 
 def parse_robot(content: bytes, file: str) -> Robot:
-    """Read a robot from the bytes of a file called `file`."""
+    """Read a robot from the bytes of a file called `file`.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> lines = ["symgen: 1", "name: pendulum", "gravity: [9.81, 0, 0]", "frames:"]
+    >>> lines += ["  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}"]
+    >>> text = "\\n".join(lines)
+    >>> robot = symgen.parse_robot(text.encode(), "pendulum.yaml")
+    >>> symgen.regrouping(robot).names
+    ('ZZ1', 'MX1', 'MY1')
+    """
     if not isinstance(content, bytes):
         raise DescriptionError(
             f"content is of type {type(content).__name__}; expected the bytes of a robot file "

@@ -50,6 +50,13 @@ def generate_module(robot: str | Path | Robot, *, command: str | None = None) ->
         As for `symgen.model`.
     command : str, optional
         As for `generate_files`.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> text = symgen.generate_module("planar_2r")
+    >>> "def regressor(" in text
+    True
     """
     robot = robot_of(robot)
     require(command, (str, type(None)), "command", "the argument of `symgen generate`, a text")

@@ -98,6 +98,15 @@ def absorptions(robot: str | pathlib.Path | Robot | Regrouping) -> tuple[Absorpt
     ----------
     robot : str, Path, Robot or Regrouping
         A robot as for `symgen.model`, or its base parameters.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> reason = symgen.absorptions("planar_2r")[1]
+    >>> reason.name, reason.base
+    ('M2', ('ZZ1R', 'MX1R'))
+    >>> reason.rule
+    'the origin of frame 2 is fixed in link 1: mass there acts as mass of link 1'
     """
     regrouping = regrouping_of(robot)
     own, particular = set(regrouping.own), set(Transfer(regrouping.robot).remaining)
@@ -152,6 +161,13 @@ def base_difference(
     ----------
     before, after : str, Path, Robot or Regrouping
         As for `absorptions`.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> on_floor = symgen.corrected("planar_2r", {"gravity": [0, 0, 0]})
+    >>> print(symgen.base_difference("planar_2r", on_floor))
+    gravity: [0, -g, 0] -> [0, 0, 0]: MX1R, MY1 disappear
     """
     before, after = regrouping_of(before), regrouping_of(after)
     old, new = ({b.own: b for b in r.base} for r in (before, after))

@@ -201,6 +201,15 @@ def regroup(robot: str | Path | Robot, *, seed: int = 1) -> Regrouping:
     SymgenError
         A general loop closes in too few states near its start, or the derivation needs more
         processor time than its limit.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> base = symgen.regrouping("planar_2r")
+    >>> base.names[:3], base.no_effect[:3]
+    (('ZZ1R', 'MX1R', 'MY1'), ('XX1', 'XY1', 'XZ1'))
+    >>> print(base.base[0].name, "=", base.base[0].formula)
+    ZZ1R = ZZ1 + Ia1 + D2**2*M2
     """
     robot = robot_of(robot)
     require(seed, int, "seed", "a whole number")

@@ -63,6 +63,13 @@ def symbolic(
     SymgenError
         If a value is given for an unknown symbol, or if "functions" is requested and passive joints
         have no linear relation.
+
+    Examples
+    --------
+    >>> import symgen
+    >>> arm = symgen.symbolic("planar_2r")
+    >>> arm.inertia_matrix()[0, 1]
+    D2*MX2*cos(q2) - D2*MY2*sin(q2) + ZZ2
     """
     require(values, (Mapping, type(None)), "values", "{symbol: number or text}")
     require(limit, int, "limit", "a number of terms")

@@ -217,6 +217,26 @@ def apply(
     ------
     DescriptionError
         The estimate is of another robot, no physical robot has it, or the file has no place for it.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np, runtime, symgen
+    >>> _ = Path("arm.urdf").write_text(
+    ...     "<robot name='arm'><link name='base'/><link name='rod'><inertial><origin xyz='0.2 0 0'/>"
+    ...     "<mass value='1'/><inertia ixx='.01' iyy='.02' izz='.02' ixy='0' ixz='0' iyz='0'/>"
+    ...     "</inertial></link><joint name='lift' type='continuous'><parent link='base'/>"
+    ...     "<child link='rod'/><axis xyz='0 1 0'/></joint></robot>"
+    ... )
+    >>> model = symgen.model("arm.urdf")
+    >>> t = np.arange(0, 10, 0.001)
+    >>> q, qd, qdd = (x[:, None] for x in (np.sin(t), np.cos(t), -np.sin(t)))
+    >>> X = model.base_parameters(model.VALUES | {"MX1": 0.25, "ZZ1": 0.09, "FV1": 2, "FS1": 1})
+    >>> record = runtime.Record(t, q, model.inverse_dynamics(q, qd, qdd, X))
+    >>> applied = symgen.apply(runtime.identify(model, record), "arm.urdf")
+    >>> change = applied.changes[0]
+    >>> change.place, change.number, change.before, round(change.after, 3)
+    ("link 'rod'", 'centre x', 0.2, 0.25)
     """
     if not isinstance(model, str | Path):
         raise DescriptionError(

@@ -215,10 +215,13 @@ def test_names_of_our_own_that_are_links_or_pipes(tmp_path, kind, name):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_command_that_is_ended_leaves_nothing(tmp_path, number):
+    """Also where the tests run in the background of a shell, whose children ignore SIGINT."""
     script = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from symgen.cli import main as command, session
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def wait():
     with session.results_in(Path(sys.argv[1])):

@@ -5,6 +5,7 @@ with pinocchio, refusals in one sentence, the language that MATLAB and Octave sh
 from __future__ import annotations
 
 import re
+import signal
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from octave import needs_octave
 import symgen
 from oracles.free_flyer import free_flyer
 from oracles.urdf_robots import ur5
+from symgen.certify import call_octave
 from symgen.certify.call_octave import Call, OctaveError, called, text_of
 from symgen.certify.importing import without_certificate
 from symgen.certify.modules import certified_files, certify
@@ -311,6 +313,21 @@ def test_nan_stays_nan():
     with np.errstate(invalid="ignore"):
         expected = module.regressor(q, qd, q)
     np.testing.assert_allclose(found.reshape(expected.shape), expected)
+
+
+@needs_octave
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_an_octave_that_a_signal_ends_leaves_no_file(number, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    server = call_octave._Octave(call_octave.octave())
+    np.zeros(1).tofile(tmp_path / call_octave.CALLS)
+    server.run(tmp_path)  # no call, but a variable
+    before = {*tmp_path.iterdir()}
+    server.process.send_signal(number)
+    server.process.stdin.close()
+    server.process.wait()
+    server.close()
+    assert {*tmp_path.iterdir()} == before
 
 
 @needs_octave
