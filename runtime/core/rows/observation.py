@@ -215,10 +215,8 @@ class Observation:
     def between(self, t0: float | None, t1: float | None) -> Observation:
         """Return the rows of Y = W X + rho with t0 <= t <= t1, s; None leaves an end open.
 
-        An interval that is asked for again is the same object, with the same factors.
+        An interval of a long record that is asked for again has the factors of before.
         """
-        if (t0, t1) in self._parts:
-            return cast("Observation", self._parts[t0, t1])
         first = -np.inf if t0 is None else t0
         last = np.inf if t1 is None else t1
         part = self.where((self.t >= first) & (self.t <= last))
@@ -227,7 +225,10 @@ class Observation:
                 f"no row of the observation lies in [{t0}, {t1}] s; the rows span "
                 f"[{self.span[0]:g}, {self.span[1]:g}] s"
             )
-        self._parts[t0, t1] = part
+        if self.streamed:
+            if (t0, t1) not in self._parts:
+                self._parts[t0, t1] = {"block_factors": part.block_factors, "factor": part.factor}
+            vars(part).update(self._parts[t0, t1])
         return part
 
     def folds(self, count: int) -> Iterator[tuple[Observation, Observation]]:
@@ -259,7 +260,7 @@ class Observation:
 
     @cached_property
     def _parts(self) -> dict[Any, Any]:
-        """Intervals of time that were asked for: `between`, and factors by their number."""
+        """Factors of intervals of a long record that were asked for, by interval or their number."""
         return {}
 
     def of_record(self, number: int) -> Observation:

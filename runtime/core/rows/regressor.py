@@ -18,7 +18,7 @@ from runtime.core.model import GeneratedModel, channels_of
 from runtime.core.rows.observation import column_numbers
 from runtime.core.rows.streamed import Entries
 from runtime.core.rows.tape import Tape, recorded
-from runtime.core.signals.decimation import PIECE, Plan, copy_overlap, decimated_parts
+from runtime.core.signals.decimation import PART, PIECE, Plan, copy_overlap, decimated_parts
 from runtime.core.signals.filters import States
 from runtime.ground.errors import InputError
 
@@ -92,23 +92,25 @@ class Columns:
         if plan is None:
             return partial(self._between, states[first:last])
         kept = np.empty((len(self.entries.place), last - first))
-        for part, signals in self.signals(states, plan):
+        for part, signals in self.signals(states, plan, PIECE):
             copy_overlap(signals, part.start, kept, first)
         return lambda a, b: kept[:, a:b]
 
     def _between(self, states: States, a: int, b: int) -> Array:
         return self._evaluated(states[a:b])
 
-    def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
+    def signals(
+        self, states: States, plan: Plan | None, most: int = PART
+    ) -> Iterator[tuple[slice, Array]]:
         """Yield the distinct entries of W, decimated, one slice of the kept samples at a time.
 
         Their shape is (S, instants). Arrays are valid until the next ones are requested.
 
-        plan : plan of the decimation; None keeps every sample.
+        plan : plan of the decimation; None keeps every sample. most : kept samples of a slice.
         """
         if plan is not None:
             yield from decimated_parts(
-                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.place), plan
+                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.place), plan, most
             )
             return
         for t0 in range(0, len(states), PIECE):
