@@ -187,9 +187,9 @@ def observation_of(
 ) -> Observation:
     """Build the system Y = W X + rho of one record; `columns` computes the observation matrix W.
 
-    whole : as for `Prepared.observation`. If errors of the velocities are known, two more kinds of rows are left out: rows in which
+    If errors of the velocities are known, two more kinds of rows are left out: rows in which
     missing positions leave the state unknown ("missing"), and rows in which the direction of dry
-    friction is uncertain ("direction").
+    friction is uncertain ("direction"). whole : as for `Prepared.observation`.
     """
     model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
