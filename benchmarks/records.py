@@ -6,8 +6,8 @@ The TX40 at 1 kHz, four sines per joint, torques with noise of 0.3 N m; from a N
 command is one process, of which the system tells the processor time and the largest resident set.
 The kinds are: the least squares alone (ols without the check of plausibility), the command as it is
 by default, and both without decimation, up to EVERY rows. The size of report.html is that of the
-default. The exponents are those of what a record
-adds to the command with the fewest rows; the load of the machine is printed.
+default. The exponents are those of what a record adds to the command with the fewest rows; the load
+of the machine is printed.
 """
 
 from __future__ import annotations
