@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from runtime.core.record import Record
     from runtime.core.result import Identification
     from runtime.core.rows.observation import Observation
+    from runtime.each import identify_each
     from runtime.files import report
     from runtime.ground.errors import InputError
     from runtime.reading.resampling import resample
@@ -68,6 +69,7 @@ __all__ = [
     "estimate",
     "excite",
     "identify",
+    "identify_each",
     "load_model",
     "load_study",
     "observe",
@@ -106,6 +108,7 @@ _MODULES = {
     "runtime.core.model": ("load_model",),
     "runtime.core.record": ("Record",),
     "runtime.reading.resampling": ("resample",),
+    "runtime.each": ("identify_each",),
     "runtime.files": ("report",),
     "runtime.advisor.advice": ("Advice",),
     "runtime.core.cestac.result": ("Cestac",),

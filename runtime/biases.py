@@ -70,14 +70,17 @@ class Biases(Part):
         """Whether the records show each bias, shape (6,)."""
         return self.sigma < LOOSE * PRIOR
 
+    @property
+    def intervals(self) -> list[str]:
+        """Each bias with its 95 % confidence interval, or that the records do not show it."""
+        return [
+            f"{b:.3g} ± {1.96 * s:.2g}" if known else "not determined"
+            for b, s, known in zip(self.values, self.sigma, self.known, strict=True)
+        ]
+
     def tables(self) -> list[Table]:
         """Make a table of the biases with their confidence intervals."""
-        rows = [
-            (axis, f"{b:.3g} ± {1.96 * s:.2g}" if known else "not determined", unit)
-            for axis, b, s, known, unit in zip(
-                AXES, self.values, self.sigma, self.known, UNITS, strict=True
-            )
-        ]
+        rows = list(zip(AXES, self.intervals, UNITS, strict=True))
         return [Table("", ("axis of frame 0", "bias ± 95 %", "unit"), rows)]
 
     def text(self) -> str:
@@ -87,10 +90,8 @@ class Biases(Part):
     def brief(self) -> str:
         """Write the biases with their 95 % confidence intervals in one line."""
         said = [
-            f"{axis} {f'{b:.3g} ± {1.96 * s:.2g} {unit}' if known else 'not determined'}"
-            for axis, b, s, known, unit in zip(
-                AXES, self.values, self.sigma, self.known, UNITS, strict=True
-            )
+            f"{axis} {text}{f' {unit}' * bool(known)}"
+            for axis, text, known, unit in zip(AXES, self.intervals, self.known, UNITS, strict=True)
         ]
         return f"Biases of the sensor on the base (± 95 %): {', '.join(said)}"
 

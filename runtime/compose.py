@@ -83,6 +83,12 @@ if TYPE_CHECKING:
     from runtime.plausible.plausibility import Plausibility
     from runtime.treatments import Ranking
 
+
+def fits_biases(problem: Problem) -> bool:
+    """Whether a record has a sensor on its base whose biases are fitted."""
+    return any(BASE_BIASES in record.channels for record in problem.records)
+
+
 STEPS: list[Step] = [
     When(
         Late("runtime.mending.corrected:corrected_model"),
@@ -105,10 +111,7 @@ STEPS: list[Step] = [
     automatic_cutoff,
     poses_at_rest,
     When(Late("runtime.laws.transmitted:transmitted_torque"), lambda p: bool(channels_of(p.model))),
-    When(
-        Late("runtime.biases:fitted_biases"),
-        lambda p: any(BASE_BIASES in r.channels for r in p.records),
-    ),
+    When(Late("runtime.biases:fitted_biases"), fits_biases),
     When(Late("runtime.laws.scalars:fitted_scalars"), lambda p: hasattr(p.model, "FIT")),
     When(
         Late("runtime.controller.fitted:law_of_controller"),
@@ -138,16 +141,16 @@ METHODS: Listed[Method] = Listed(
         "didim": "runtime.loop.didim:METHOD",
     }
 )
-CORRECTIONS: list[Correction] = [Late("runtime.biases:with_biases"), with_lacking]
+CORRECTIONS: list[Correction] = [
+    When(Late("runtime.biases:with_biases"), lambda r: fits_biases(r.problem)),
+    with_lacking,
+]
 EXTRAS: list[Extra] = [
     PartWhen(
         Late("runtime.packets.packets:packets_told"),
         lambda r: r.problem.noted(PACKETS) is not None,
     ),
-    PartWhen(
-        Late("runtime.biases:told_biases"),
-        lambda r: any(BASE_BIASES in record.channels for record in r.records),
-    ),
+    PartWhen(Late("runtime.biases:told_biases"), lambda r: fits_biases(r.problem)),
     PartWhen(
         Late("runtime.sensor_axes:sensor_axes"),
         lambda r: any(BASE_IMU in record.channels for record in r.records),

@@ -1,7 +1,8 @@
 """Features that are imported only when they are used, so that they do not slow down other calls.
 
 Late("runtime.friction:friction")                  a function
-When(Late("runtime.wrench:force_sensors"), ...)    a step of some problems; PartWhen: an analysis
+When(Late("runtime.wrench:force_sensors"), ...)    a step of some problems, or a correction of some
+                                                   identifications; PartWhen: an analysis
 Listed({"iv": "runtime.loop.iv:METHOD"})           a list of names
 """
 
@@ -10,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
-from runtime.core.problem import Problem, Step
 from runtime.core.result import Identification
 from runtime.ground.part import Part
 
@@ -36,14 +36,14 @@ class Late:
 
 
 @dataclass(frozen=True)
-class When:
-    """A preparation step that acts only on the problems that meet a condition."""
+class When(Generic[T]):
+    """A step that changes only the problems, or the identifications, that meet a condition."""
 
-    step: Step
-    condition: Callable[[Problem], bool]
+    step: Callable[[T], T]
+    condition: Callable[[T], bool]
 
-    def __call__(self, problem: Problem) -> Problem:
-        return self.step(problem) if self.condition(problem) else problem
+    def __call__(self, given: T) -> T:
+        return self.step(given) if self.condition(given) else given
 
 
 @dataclass(frozen=True)

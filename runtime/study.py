@@ -249,12 +249,12 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         try:
             records = read_records(study.record, model, missing=missing)
         except InputError as e:
-            text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
+            text = _set(e.remedy or {}, e)
             if not e.remedy or text in sentences:
                 rest = _unfinished(study, model, sentences, e)
                 if rest.study == study or rest.unrecognised.keys() != {"record"}:
                     return rest
-                sentences.append(f"{e}; suggested: the columns and units that the names show")
+                sentences.append("record: the columns and units that their names show")
                 study = rest.study  # all is recognised: try again
                 continue
             sentences.append(text)
@@ -265,8 +265,8 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         if unit == "s" or own.units.t != "s" or own.rate is not None:
             break
         sentences.append(
-            f"the time steps of {1 / records[0].rate:g} s are too long for seconds; "
-            f"suggested: record: {{units: {{t: {unit}}}}}"
+            f"record: units: {{t: {unit}}}, because time steps of {1 / records[0].rate:g} s are "
+            "too long"
         )
         study = _with_settings(study, {"units": {"t": unit}})
     open_: dict[str, str] = {}
@@ -279,10 +279,16 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
         )
     turns = [_starts_anew(one, model, missing) for one in study.record]
     if any(turns):
-        sentences.append("positions start anew at full turns; suggested: record: {unwrap: true}")
+        sentences.append("record: unwrap: true, because positions start anew at full turns")
         pairs = zip(study.record, turns, strict=True)
         study = replace(study, record=tuple(replace(r, unwrap=r.unwrap or t) for r, t in pairs))
     return Suggestion(study, tuple(sentences), open_)
+
+
+def _set(settings: Mapping[str, Any], error: InputError) -> str:
+    """Tell which settings of the section `record` were set, and why."""
+    why = "as the names of the columns show" if "columns" in settings else f"because {error}"
+    return f"record: {' '.join(yaml_text(settings).split())}, {why}"
 
 
 def _beyond_limits(

@@ -188,13 +188,13 @@ def room(module: str) -> float:
 
 
 def feature(module: str) -> str:
-    """The part of runtime that a module belongs to: the ground, the core, a folder, or a file; "" for the lists, the whole study, the files of results and the package."""
+    """The part of runtime that a module belongs to: the ground, the core, a folder, or a file; "" for the lists, the whole study, the files of results, many records and the package."""
     first = module.split(".")[1] if "." in module else ""
-    return "" if first in ("compose", "files", "study") else first
+    return "" if first in ("compose", "each", "files", "study") else first
 
 
 def test_a_feature_of_the_runtime_imports_the_core_and_itself() -> None:
-    """`runtime.compose`, `runtime.study`, `runtime.files` and the package itself name features; no feature imports these."""
+    """`runtime.compose`, `runtime.study`, `runtime.files`, `runtime.each` and the package itself name features; no feature imports these."""
     wrong = set()
     for name in (n for n in MODULES if n.partition(".")[0] == "runtime" and feature(n)):
         own = feature(name)

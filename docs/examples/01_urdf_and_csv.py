@@ -42,5 +42,6 @@ for j, axis in enumerate(axes):
     axis.plot(t, tau[:, j], color="0.75", lw=3, label="measured")
     axis.plot(t, predicted[:, j], color="0.1", lw=0.8, label="predicted")
     axis.set_ylabel(f"joint {j + 1}, N m")
-axes[0].legend()
+axes[0].legend(ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
+axes[1].set_xlabel("time, s")
 figure.savefig("urdf_and_csv.png")

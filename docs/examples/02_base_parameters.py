@@ -15,11 +15,12 @@ for parameter in base.base:
         print(f"{parameter.name:6} = {parameter.formula}")
 print("no effect:", *base.no_effect)
 
-names = base.robot.parameters
-K = np.array([[name in parameter.combination for name in names] for parameter in base.base])
-plt.figure(figsize=(14, 7))
+sums = [parameter for parameter in base.base if len(parameter.combination) > 1]
+names = [x for x in base.robot.parameters if any(x in row.combination for row in sums)]
+K = np.array([[name in row.combination for name in names] for row in sums])
+plt.figure()
 plt.spy(K, aspect="auto", markersize=4)
-plt.xticks(range(len(names)), names, rotation=90, fontsize=6)
-plt.yticks(range(len(K)), base.names, fontsize=6)
-plt.title("Rows: base parameters. Columns: what each is made of")
+plt.xticks(range(len(names)), names, rotation=90, fontsize=7)
+plt.yticks(range(len(K)), [row.name for row in sums], fontsize=7)
+plt.xlabel("each row is a sum of these parameters")
 plt.savefig("base_parameters.png")

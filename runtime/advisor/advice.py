@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from runtime.core.cestac.result import deciding_names
+from runtime.core.cestac.result import (
+    NOTHING_KNOWN,
+    deciding_names,
+    known_names,
+    negligible,
+    verdict_of,
+    weighed_change,
+)
 from runtime.core.cestac.runs import Level
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.result import Identification
@@ -20,17 +27,22 @@ from runtime.ground.check import Answer, Check, Question, state_of
 from runtime.ground.documents import Result, json_text
 from runtime.ground.limits import limits
 from runtime.ground.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
-from runtime.ground.table import Table, percentage
+from runtime.ground.table import Table, number, percentage
 
 LIMIT = limits(__package__)
 
 Array = np.ndarray
 
 LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes of the figure
-LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
+LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # weighed changes at which a step is sought
 POSES = "Not judged for poses at rest, which have no accelerations"
 """What is said of the encoder where the records are poses."""
 ALL = "all"  # Label of the advice on all encoders alike
+FEW = (
+    "if you need few parameters, name them: --columns ZZ1R,MX2R of symgen report and cestac, or "
+    "cestac: {columns: [ZZ1R, MX2R]} of the study"
+)
+"""The way to a judgement of the parameters alone that are needed."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +98,19 @@ def sampled(delta: float, ratios: Array) -> Sampled:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Coarsest encoder step that keeps the change of every parameter below a limit, such as 1 %.
-    Only parameters of small relative standard deviation %sigma are judged.
+    """Coarsest encoder step that keeps the change of every parameter below a limit of the verdict.
 
     Attributes
     ----------
     percent : float, %
+        1 or 5: least squares is practically unbiased below, or biased above. The limit of a
+        parameter is `percent`, or a tenth or half of its 95 % interval if that is more.
     delta : float, rad or m
-        inf if no step reaches it; nan if even the finest step exceeds it, or if no parameter is
-        judged.
+        inf if no step reaches it; nan if even the finest step exceeds it.
     parameter : str
         The first parameter that reaches it; "" if there is none.
+    change : float, %
+        Limit of this parameter.
     sampled : Sampled or None
         CESTAC runs at that step; None without runs.
     error, half_width : float, %
@@ -106,6 +120,7 @@ class Limit:
     percent: float
     delta: float
     parameter: str
+    change: float = float("nan")
     sampled: Sampled | None = None
     error: float = float("nan")
     half_width: float = float("nan")
@@ -119,8 +134,8 @@ class Limit:
         """
         return (
             self.sampled is None
-            or abs(self.error - self.percent)
-            <= self.half_width + LIMIT.PREDICTION_AGREES * self.percent
+            or abs(self.error - self.change)
+            <= self.half_width + LIMIT.PREDICTION_AGREES * self.change
         )
 
 
@@ -152,8 +167,8 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Find, for each parameter, the smallest encoder step at which its value changes by a
-        limit. The limit is `percent` %.
+        """Find, for each parameter, the smallest encoder step at which its value changes by
+        `percent` %, whatever its interval.
 
         Return the steps, shape (b,); nan if the curve does not show this step.
         """
@@ -228,14 +243,14 @@ class Advice(Result, Part):
 
     def text(self) -> str:
         """Write the verdict, the change of each parameter at the requested encoder steps, and assumptions."""
-        return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
+        return "\n".join([self.verdict, *self.doubts(), *self.asked_lines(), *self.assumptions])
 
     def figures(self) -> tuple[Figure, ...]:
         """Plot the change of every parameter that decides the verdict against the encoder step.
 
-        No figure without a deciding parameter.
+        No figure if the record determines none of them.
         """
-        return (advice_figure(self),) if self.deciding else ()
+        return (advice_figure(self),) if known_names(self.reference) else ()
 
     def checks(self) -> tuple[Check, ...]:
         """Return the check "Does the encoder resolve enough?" of the report, as a tuple."""
@@ -251,10 +266,7 @@ class Advice(Result, Part):
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict: those of small standard deviation.
-
-        The relative standard deviation %sigma, eq. (11), is at most 10 %.
-        """
+        """Names of the parameters that decide the verdict: those that study.cestac.columns names."""
         return deciding_names(self.reference)
 
     @property
@@ -286,18 +298,19 @@ class Advice(Result, Part):
             self.settings.get("cestac", {}).get("side", "joint")
         ]
 
-    def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """Find which parameter of small %sigma changes most at a requested encoder step.
+    def worst(self, step: int, steps: Array | None = None) -> tuple[str, float, float]:
+        """Find which parameter is affected most by a requested encoder step.
 
-        Return its name and its change %e.
+        Return its name, its change %e, and this change in units of what is negligible for it.
 
         step : number of the requested step, from 0.
         steps : changes at the requested steps; default: those of the advice.
         """
         decisive = deciding_columns(self.reference)
-        e = np.abs((self.steps if steps is None else steps)[step])[decisive]
-        k = int(np.argmax(e)) if len(e) else 0
-        return (self.names[decisive[k]], float(e[k])) if len(e) else ("", float("nan"))
+        change = (self.steps if steps is None else steps)[step]
+        weighed = weighed_change(change, self.reference)[decisive]
+        k = int(np.argmax(weighed))
+        return self.names[decisive[k]], float(np.abs(change[decisive[k]])), float(weighed[k])
 
     @property
     def negative(self) -> bool:
@@ -307,7 +320,7 @@ class Advice(Result, Part):
         """
         several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
-        return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
+        return contradicted or any(self.worst(k)[2] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
@@ -316,98 +329,137 @@ class Advice(Result, Part):
         It states the coarsest steps of all encoders together, and which single encoder must be
         finest.
         """
-        parts: list[str] = []
-        for name, encoders, _ in self.ways:
-            parts += [f"Real encoders read as {name}:"] if name else []
-            parts += self._answers(encoders)
-        parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
-        return " ".join(parts)
+        sentences = dict.fromkeys(one for way in self.ways for one in self._answers(*way[:2]))
+        return " ".join(
+            [*sentences, "Noise of the torques does not bias the estimate; it adds to sigma."]
+        )
 
-    def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
+    def _way(self, name: str) -> str:
+        """Say how positions are rounded and read, for one of the `ways`."""
+        law = self.settings.get("cestac", {}).get("rounding", "")
+        return f"real, {name}" if name else f"rounding {law}"
+
+    def _answers(self, name: str, encoders: Sequence[EncoderAdvice]) -> list[str]:
         """Write the verdict, in sentences, for one rounding law or one way to read real encoders.
 
-        The first sentences are about all encoders together.
+        The first sentence is about all encoders together.
         """
-        if not self.deciding:
-            return [
-                (
-                    f"no parameter has a %sigma of at most {LIMIT.DECIDING:g} %, so no step can be "
-                    "judged; "
-                    "record a motion that excites the joints more, or identify fewer columns."
-                )
-            ]
         first, single = encoders[0], encoders[1:]
-        parts = [
-            self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits
-        ]
+        if not known_names(self.reference):
+            return [f"{NOTHING_KNOWN}."]
+        way = f"{self._way(name)}:"
+        parts = [f"{way[0].upper()}{way[1:]} {self._sentence(first)}"]
         for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():
             known = [
                 advice
                 for advice in single
-                if advice.unit == unit and not np.isnan(advice.limits[0].delta)
+                if advice.unit == unit and np.isfinite(advice.limits[0].delta)
             ]
-            if not known:
-                continue
-            hardest = min(known, key=lambda advice: advice.limits[0].delta)
-            limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
-            parts.append(
-                f"Of single encoders{kind}, that of joint {hardest.label} must be the finest: "
-                f"{step_text(limit.delta, unit)} for a change of {limit.percent:g} % "
-                f"({limit.parameter or 'no parameter'})."
-            )
-        doubted = [
-            f"{advice.label} at {limit.percent:g} %"
-            for advice in encoders
-            for limit in advice.limits
-            if not limit.agrees
-        ]
-        if doubted:
-            parts.append(
-                f"Random runs do not confirm the prediction for {', '.join(doubted)}; use the "
-                "result of the runs."
-            )
+            if known:
+                hardest = min(known, key=lambda advice: advice.limits[0].delta)
+                kind = "" if unit == self.unit else f" of those in {unit}"
+                parts.append(
+                    f"Alone, that of joint {hardest.label} must be the finest{kind}: "
+                    f"{step_text(hardest.limits[0].delta, unit)}."
+                )
         return parts
 
-    def _sentence(self, limit: Limit, who: str, unit: str) -> str:
-        if np.isnan(limit.delta) and not limit.parameter:
-            return f"{who}, no step could be judged on this record."
-        if np.isnan(limit.delta):
-            return (
-                f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the "
-                "finest step that was tried."
+    def _sentence(self, advice: EncoderAdvice) -> str:
+        """Say up to which step one choice of encoders does not bias least squares."""
+        small, large = advice.limits
+        if np.isnan(small.delta) and not small.parameter:
+            return "no step could be judged on this record."
+        alike = "all encoders alike" if advice.label == ALL else f"that of joint {advice.label}"
+        if np.isnan(small.delta):
+            text = f"with {alike}, the finest step tried changes {small.parameter} visibly"
+        elif np.isinf(small.delta):
+            return f"with {alike}, no step changes a parameter visibly."
+        else:
+            text = (
+                f"with {alike}, least squares is practically unbiased up to Delta = "
+                f"{step_text(small.delta, advice.unit)} {self.place} ({small.parameter} first)"
             )
-        if not np.isfinite(limit.delta):
-            return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
-        text = (
-            f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = "
-            f"{step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
-        )
-        if limit.sampled is not None:
-            text += (
-                f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- "
-                f"{limit.half_width:.2f} %"
-            )
-        return text + ")."
+        if not np.isfinite(large.delta):
+            return f"{text}."
+        return f"{text}, and biased from {step_text(large.delta, advice.unit)} ({large.parameter})."
+
+    def doubts(self) -> list[str]:
+        """List the predicted steps that random runs do not confirm, a sentence for each way."""
+        found = []
+        for name, encoders, _ in self.ways:
+            doubted = [
+                f"{advice.label} at {limit.change:.2g} % of {limit.parameter} ({limit.error:.2g} +- "
+                f"{limit.half_width:.2g} % in the runs)"
+                for advice in encoders
+                for limit in advice.limits
+                if not limit.agrees
+            ]
+            if doubted:
+                found.append(
+                    f"Random runs do not confirm these steps ({self._way(name)}): "
+                    f"{', '.join(doubted)}; use the result of the runs."
+                )
+        return found
 
     def brief(self) -> str:
-        """Write the verdict, each encoder's coarsest step, and changes of X at requested steps."""
-        steps = [f"{table.caption}\n{table.to_text()}" for table in self.tables()[:-1]]
-        return "\n\n".join([self.verdict, *steps, *self.asked_lines()])
+        """Write the coarsest step of each encoder in one table, the verdict, and doubts."""
+        table = self.answer_table()
+        answers = dict.fromkeys(line for way in self.ways for line in self._answers(*way[:2]))
+        return "\n\n".join(
+            [
+                f"{table.caption}\n{table.to_text()}",
+                *self.asked_lines(),
+                "\n".join([*answers, *self.doubts()]),
+                "Which parameter changes first, the runs at each step, and the assumptions: --verbose",
+            ]
+        )
+
+    def answer_table(self) -> Table:
+        """Make the table of the answer: the coarsest step of each encoder, by law and by reader.
+
+        The first step is practically unbiased; from the second step on, a parameter is biased.
+        """
+
+        def cell(advice: EncoderAdvice) -> str:
+            small, large = (
+                "none"
+                if np.isnan(limit.delta)
+                else "any"
+                if np.isinf(limit.delta)
+                else (counts(limit.delta) if advice.unit == "rad" else "") or f"{limit.delta:.3g}"
+                for limit in advice.limits
+            )
+            doubt = "" if all(limit.agrees for limit in advice.limits) else " ?"
+            return f"{small}, {large}{doubt}"
+
+        rows = []
+        for alike in zip(*(encoders for _, encoders, _ in self.ways), strict=True):
+            label = (
+                alike[0].label
+                if alike[0].unit == self.unit
+                else f"{alike[0].label}, {alike[0].unit}"
+            )
+            rows.append((label, *map(cell, alike)))
+        caption = (
+            f"Encoder step {self.place}, {self.unit}: least squares is practically unbiased up to the "
+            "first, biased from the second; row of a joint: the others exact; ? runs disagree"
+        )
+        return Table(caption, ("encoder", *(self._way(name) for name, *_ in self.ways)), rows)
 
     def to_table(self) -> str:
-        """Write tables of the coarsest acceptable encoder steps, then the assumptions."""
+        """Write tables of the coarsest acceptable encoder steps, then doubts and assumptions."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
         return "\n\n".join(
             [
                 *tables,
                 *self.asked_lines(),
-                "\n".join(f"- {text}" for text in (*self.assumptions, *notes)),
+                "\n".join(f"- {text}" for text in (*self.doubts(), *self.assumptions, *notes)),
             ]
         )
 
     def tables(self) -> list[Table]:
-        """Make the tables of the coarsest encoder steps: for each encoder, then for each parameter.
+        """Make the tables of the coarsest encoder steps: in short, for each encoder, for each parameter.
 
         The steps of each encoder have one table for the chapter's rounding law and one for real
         encoders.
@@ -424,7 +476,7 @@ class Advice(Result, Part):
             for caption, ways in zip(captions, (law, real), strict=True)
             if ways
         ]
-        return [*tables, self.parameter_table()]
+        return [self.answer_table(), *tables, self.parameter_table()]
 
     def _step_table(
         self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
@@ -434,11 +486,10 @@ class Advice(Result, Part):
         Each rounding law or reader has its own columns.
         """
         headers, rows = ["encoder"], []
-        for name, encoders, _ in ways:
-            for limit in encoders[0].limits:
-                percent = f"{limit.percent:g} %"
-                step = f"{name}, {percent}" if name else f"{percent}: Delta, {self.unit}"
-                headers += [step, "first parameter", "sampled %e"]
+        for name, *_ in ways:
+            for words in ("unbiased", "biased"):
+                step = f"{name}, {words}" if name else f"{words}: Delta, {self.unit}"
+                headers += [step, "first parameter", "%e", "sampled %e"]
         for alike in zip(*(encoders for _, encoders, _ in ways), strict=True):
             unit = alike[0].unit
             cells = [alike[0].label if unit == self.unit else f"{alike[0].label}, {unit}"]
@@ -446,13 +497,13 @@ class Advice(Result, Part):
                 runs = f"{limit.error:.2f} ± {limit.half_width:.2f}" if limit.sampled else "-"
                 step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
                 turn = counts(limit.delta) if unit == "rad" else ""
-                cells += [turn or step, limit.parameter or "-", runs]
+                cells += [turn or step, limit.parameter or "-", number(limit.change, ".3g"), runs]
             rows.append(tuple(cells))
         return Table(caption, headers, rows)
 
     def parameter_table(self) -> Table:
         """Make the table of the parameters: %sigma, the encoder steps that change each parameter by
-        1 % and 5 %, and the increase of %sigma by torque noise.
+        1 % and 5 % whatever its interval, and the increase of %sigma by torque noise.
 
         The steps are those of all encoders together. The effect is %sigma added by torque noise,
         per N m (N) of its standard deviation.
@@ -495,12 +546,12 @@ class Advice(Result, Part):
         lines = []
         for k, delta in enumerate(self.asked):
             for reader, _, steps in self.ways:
-                name, e = self.worst(k, steps)
+                name, e, weighed = self.worst(k, steps)
                 way = f", read as {reader}" if reader else ""
                 change = (
                     "not judged on this record"
-                    if np.isnan(e)
-                    else f"largest predicted change {e:.2f} % ({name})"
+                    if np.isnan(e) or not known_names(self.reference)
+                    else f"predicted {verdict_of(weighed)}, {name} changes by {e:.2f} %"
                 )
                 lines.append(f"Delta = {Level(delta).label}{way}: {change}")
         return ["\n".join(lines)] if lines else []
@@ -514,7 +565,7 @@ class Advice(Result, Part):
                 "X_LS": self.reference.X,
                 "relative_sigma_LS": self.reference.relative_sigma,
                 "deciding": self.deciding,
-                "deciding_relative_sigma": LIMIT.DECIDING,
+                "negligible": negligible(self.reference),
                 "verdict": self.verdict,
                 "encoders": [_summary(advice) for advice in self.encoders],
                 "real": {
@@ -590,7 +641,8 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
 
 @Question(
     "Does the encoder resolve enough?",
-    f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
+    f"bias below {LIMIT.NEGLIGIBLE:g} % or a tenth of the interval (usable to {LIMIT.BIASED:g} % or "
+    "half of it)",
 )
 def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
     """Judge whether the encoder step is small enough, from the resolution advice if there is one.
@@ -612,14 +664,15 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
             "doubtful",
             f"{text}, and inertias too small",
             "finer positions, or signals: {reader: counts}; symgen cestac --advise says how far "
-            "each value moves",
+            f"each value moves; {FEW}",
         )
-    steps = ", ".join(
-        f"{one.percent:g} % up to "
-        f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
+    small, large = (
+        step_text(one.delta, advice.unit) if np.isfinite(one.delta) else "any step"
         for one in advice.encoders[0].limits
     )
-    text = f"Values by least squares change by at most {steps} {advice.place}"
+    text = (
+        f"Least squares is practically unbiased up to {small}, biased from {large} {advice.place}"
+    )
     if not advice.asked:
         return Answer(
             "open",
@@ -627,12 +680,15 @@ def answer(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer
             "give the step of your encoder: symgen report --encoder STEP (with --side motor for "
             "an encoder on the motor)",
         )
-    name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
+    found = [advice.worst(k) for k in range(len(advice.asked))]
+    name, error, weighed = max(found, key=lambda item: item[2])
     labels = ", ".join(Level(step).label for step in advice.asked)
     return Answer(
-        state_of(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
-        f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
-        "a finer encoder; with a section `controller` of the study, also estimate.method: iv or didim",
+        state_of(weighed, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
+        f"{text}; at {labels} {name} is affected most and changes by "
+        f"{error:.{0 if error >= 10 else 1}f} %",
+        f"{FEW}; or a finer encoder; with a section `controller` of the study, also estimate.method: "
+        "iv or didim",
     )
 
 
@@ -697,34 +753,39 @@ def confirm_by_runs(
 
 
 def deciding_columns(reference: Estimate) -> list[int]:
-    """Numbers of the parameters that decide the verdict: those of small %sigma."""
+    """Numbers of the parameters that decide the verdict."""
     return [reference.names.index(name) for name in deciding_names(reference)]
 
 
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
-    """Find the coarsest encoder steps that change parameters of small %sigma by up to 1 % and 5 %.
+    """Find the coarsest encoder steps that do not bias a parameter visibly, and that do not bias it.
 
-    nan if the finest step is already too coarse or no parameter is judged; inf if every step is
-    fine enough.
+    nan if the finest step is already too coarse or none could be tried; inf if every step is fine
+    enough.
     """
-    names, limits = deciding_names(reference), []
-    e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
-    for percent in LIMITS if len(delta) else ():
-        first = {name: crossing(delta, e[name], percent) for name in names}
-        beyond = [name for name in names if e[name][0] > percent]
-        reached = [name for name in names if np.isfinite(first[name])]
+    if not len(delta):
+        return tuple(Limit(percent, np.nan, "") for percent in LIMITS)
+    decisive, limits = deciding_columns(reference), []
+    weighed, allowed = weighed_change(change, reference), negligible(reference)
+    for percent in LIMITS:
+        first = {i: crossing(delta, weighed[:, i], percent) for i in decisive}
+        beyond = [i for i in decisive if weighed[0, i] > percent]
+        reached = [i for i in decisive if np.isfinite(first[i])]
         if beyond:
-            limits.append(Limit(percent, np.nan, max(beyond, key=lambda name: e[name][0])))
+            i = max(beyond, key=lambda i: weighed[0, i])
+            step = np.nan
         elif reached:
-            name = min(reached, key=lambda name: first[name])
-            limits.append(Limit(percent, first[name], name))
+            i = min(reached, key=lambda i: first[i])
+            step = first[i]
         else:
             limits.append(Limit(percent, np.inf, ""))
-    return tuple(limits) or tuple(Limit(percent, np.nan, "") for percent in LIMITS)
+            continue
+        limits.append(Limit(percent, step, reference.names[i], float(percent * allowed[i])))
+    return tuple(limits)
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """Find the smallest encoder step at which the change e of a parameter, %, reaches `percent`.
+    """Find the smallest encoder step at which the change e of a parameter reaches `percent`.
 
     Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
     `percent`, or if the first point is already above.

@@ -1,4 +1,4 @@
-"""Resolution advisor: predict the coarsest encoder that changes the estimate by at most 1 % or 5 %.
+"""Resolution advisor: predict the coarsest encoder that does not bias the estimate.
 
 No sampling is needed. CESTAC rounds every position at random, many times, and measures how far the
 mean estimate moves. This mean is known to first order in the variance v of the rounding (errors in
@@ -10,8 +10,7 @@ variables), from the expected normal equations of `runtime.advisor.position_erro
 
 So one set of sensitivities gives the curve of every parameter, for all encoders together and for
 one at a time with the others exact. Runs of CESTAC, with Student intervals, confirm the step at
-which the first parameter that matters reaches a limit. Parameters matter if their %sigma (11) is at
-most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
+which the first parameter reaches a limit of the verdict (`runtime.core.cestac.result`).
 
 Noise of the torques does not change the mean: Y is linear in it. It increases sigma; for white
 noise of the motors
@@ -27,7 +26,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial, reduce
-from itertools import count
 from operator import add
 from typing import Any
 
@@ -47,9 +45,14 @@ from runtime.advisor.advice import (
 )
 from runtime.advisor.coarse_encoders import CoarseEncoders
 from runtime.advisor.position_errors import Perturbation, perturbation, solution, value_reader
-from runtime.advisor.readers import encoder_readers, reader_advice, readers_in_words
+from runtime.advisor.readers import (
+    encoder_readers,
+    parts_of_reader,
+    reader_advice,
+    readers_in_words,
+)
 from runtime.core.cestac.perturbed import study_columns
-from runtime.core.cestac.result import deciding_names, names_judged
+from runtime.core.cestac.result import deciding_names, names_judged, weighed_change
 from runtime.core.cestac.rounding import VARIANCE
 from runtime.core.drives import Drives
 from runtime.core.least_squares.estimate import Estimate
@@ -63,6 +66,7 @@ from runtime.core.signals.reader import Reader
 from runtime.core.study import Study
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
+from runtime.ground.progress import Work, at
 from runtime.ground.settings import to_mapping
 
 LIMIT = limits(__package__)
@@ -152,8 +156,8 @@ class MeasuredFit:
 
         share : variance of the rounding over Delta^2.
         """
-        rates = replace(self.predictor, share=share).rate(encoders)
-        rate = np.abs(rates[deciding_columns(self.reference)]).max(initial=0.0)
+        rates = weighed_change(replace(self.predictor, share=share).rate(encoders), self.reference)
+        rate = rates[deciding_columns(self.reference)].max(initial=0.0)
         return float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
 
 
@@ -168,7 +172,7 @@ def advise(
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Advice:
-    """Predict the coarsest encoders that change the estimate by less than 1 % and by less than 5 %.
+    """Predict the coarsest encoders that leave the estimate practically unbiased, and not biased.
 
     Side, rounding law, columns and number of runs are those of study.cestac. Real encoders (law
     phase) are judged for each of `readers` (`runtime.advisor.readers`).
@@ -189,7 +193,8 @@ def advise(
     confirm : bool
         Whether CESTAC runs confirm the steps of the limits, study.cestac.runs at each.
     progress : callable, optional
-        Called with the number of choices of encoders done and their total.
+        Called with the number of finished parts of the work, and of all parts as far as they are
+        expected; a part is one step of one choice of encoders.
     provenance : mapping, optional
         Further entries of Advice.provenance, besides the names and time stamps of the records.
 
@@ -203,14 +208,15 @@ def advise(
     fit = measured_fit(problem, columns, provenance or {})
     study, law = fit.problem.settings, fit.problem.settings.cestac.rounding
     groups = encoder_groups(problem.model, study.cestac.side, encoders)
-    total = len(groups) * ((law != "phase") + len(readers))
-    advance = _counter(progress, total)
-    real = advice_by_reader(fit, groups, readers, asked, confirm, advance)
+    stages = parts_of_law(groups, confirm) * (law != "phase")
+    work = Work(progress, stages + len(readers) * parts_of_reader(groups, confirm))
+    work.advance(0)
+    real = advice_by_reader(fit, groups, readers, asked, confirm, work)
     if law == "phase":
         own = next((one for one in real if one.reader == study.signals.reader), real[0])
         by_group, steps = real[0].encoders, own.steps
     else:
-        by_group = advice_by_law(fit, groups, confirm, advance)
+        by_group = advice_by_law(fit, groups, confirm, work)
         changes = [fit.predictor.change(delta, fit.every) for delta in asked]
         steps = np.array(changes).reshape(len(asked), len(fit.names))
     return Advice(
@@ -266,7 +272,7 @@ def advice_by_reader(
     readers: Mapping[str, Reader],
     asked: Sequence[float],
     confirm: bool,
-    advance: Callable[[], None],
+    work: Work,
 ) -> tuple[ReaderAdvice, ...]:
     """Compute how coarse real encoders may be, by each reader."""
     start = fit.first_step(fit.every, VARIANCE["phase"])
@@ -281,17 +287,19 @@ def advice_by_reader(
             start,
             asked=asked,
             confirm=confirm,
-            progress=advance,
+            work=work,
         )
         for name, reader in readers.items()
     )
 
 
 def advice_by_law(
-    fit: MeasuredFit, groups: Sequence[EncoderGroup], confirm: bool, advance: Callable[[], None]
+    fit: MeasuredFit, groups: Sequence[EncoderGroup], confirm: bool, work: Work
 ) -> tuple[EncoderAdvice, ...]:
     """Predict how coarse encoders may be that round by the law of the study, for each group."""
     problem, advices = fit.problem, []
+    at(f"encoders that round by the law {problem.settings.cestac.rounding}")
+    work.begin(parts_of_law(groups, confirm))
     if confirm:
         law, reader = problem.settings.cestac.rounding, value_reader(problem.reader)
         runs = CoarseEncoders(problem, fit.names, fit.drives, law, reader)
@@ -300,8 +308,14 @@ def advice_by_law(
         if confirm:
             advice = confirm_by_runs(advice, fit.reference, partial(runs.sampled, group.encoders))
         advices.append(advice)
-        advance()
+        work.advance(parts_of_law([group], confirm))
+    work.end()
     return tuple(advices)
+
+
+def parts_of_law(groups: Sequence[EncoderGroup], confirm: bool) -> int:
+    """Count the parts of the work for one law of rounding: a curve and two limits, by group."""
+    return len(groups) * (1 + len(LIMITS) * confirm)
 
 
 def encoder_groups(
@@ -333,17 +347,6 @@ def encoder_groups(
     )
 
 
-def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
-    """Return a function that reports one more of `total` choices of encoders as done."""
-    done = count(1)
-
-    def advance() -> None:
-        if progress is not None:
-            progress(next(done), total)
-
-    return advance
-
-
 def predicted_advice(fit: MeasuredFit, group: EncoderGroup) -> EncoderAdvice:
     """Compute how the estimate changes with the step of some encoders, and how coarse they may be.
 
@@ -362,7 +365,7 @@ def predicted_advice(fit: MeasuredFit, group: EncoderGroup) -> EncoderAdvice:
         return fit.predictor.change(start * LIMIT.CURVE_RATIO**k, group.encoders)
 
     def worst(k: int) -> float:
-        return float(np.abs(change(k)[decisive]).max())
+        return float(weighed_change(change(k), fit.reference)[decisive].max())
 
     down, last = range(0, -LIMIT.CURVE_STEPS, -1), LIMIT.CURVE_STEPS - 1
     low = next((k for k in down if worst(k) < LIMITS[0]), -LIMIT.CURVE_STEPS)
@@ -372,7 +375,10 @@ def predicted_advice(fit: MeasuredFit, group: EncoderGroup) -> EncoderAdvice:
     exponents = range(low, max(high, 0) + 1)
     delta = start * LIMIT.CURVE_RATIO ** np.array(exponents, dtype=float)
     changes = np.array([change(k) for k in exponents])
-    found = limits_of(delta, changes, fit.reference)
+    found = tuple(
+        Limit(one.percent, np.inf, "") if group.unit == "rad" and one.delta >= np.pi else one
+        for one in limits_of(delta, changes, fit.reference)
+    )  # an encoder that turns has two steps at least
     return EncoderAdvice(group.label, found, delta, changes, unit=group.unit)
 
 
@@ -472,8 +478,9 @@ def assumptions(
             if friction and law
             else []
         ),
-        f"Parameters matter whose %sigma (11) is at most {LIMIT.DECIDING:g} %"
-        + (f"; not: {', '.join(out)}." if out else ", here all of them."),
+        f"A change is negligible below {LIMIT.NEGLIGIBLE:g} % or a tenth of the 95 % interval of its "
+        f"parameter, and a bias above {LIMIT.BIASED:g} % and half of the interval"
+        + (f"; not asked for: {', '.join(out)}." if out else "."),
         (
             "Torques: white noise of the motors does not bias X, since Y is linear in it and W does "
             "not depend on it; it only increases sigma."

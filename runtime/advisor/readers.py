@@ -10,9 +10,9 @@ limit is certain to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -28,9 +28,11 @@ from runtime.advisor.advice import (
     step_text,
 )
 from runtime.advisor.coarse_encoders import CoarseEncoders, mean_change
+from runtime.core.cestac.result import weighed_change
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.signals.reader import Reader
 from runtime.ground.limits import limits
+from runtime.ground.progress import Work, at
 
 LIMIT = limits(__package__)
 
@@ -74,7 +76,7 @@ def reader_advice(
     *,
     asked: Sequence[float] = (),
     confirm: bool = True,
-    progress: Callable[[], None] = lambda: None,
+    work: Work | None = None,
 ) -> ReaderAdvice:
     """Compute how coarse real encoders may be if one reader reads them.
 
@@ -84,10 +86,14 @@ def reader_advice(
     start : a step about which the curve begins, rad or m.
     asked : further steps, of all encoders.
     confirm : whether random runs confirm the limits.
-    progress : called after each choice of encoders.
+    work : counts its parts: steps of a curve, and limits that runs confirm.
     """
+    work = work or Work()
+    at(f"real encoders, read as {read_as}")
+    work.begin(parts_of_reader(groups, confirm))
     selections = {group.label: group.encoders for group in groups}
-    by_label, encoders = curves(real, selections, start, deciding_columns(reference)), []
+    by_label, encoders = curves(real, selections, start, reference, work), []
+    work.left = len(LIMITS) * len(groups) * confirm
     for group in groups:
         delta, change = by_label[group.label][0], by_label[group.label][1][:, 0]
         found = limits_of(delta, change, reference)
@@ -95,7 +101,8 @@ def reader_advice(
         if confirm:
             advice = confirm_by_runs(advice, reference, partial(real.sampled, group.encoders))
         encoders.append(advice)
-        progress()
+        work.advance(len(LIMITS) * confirm)
+    work.end()
     deviation = by_label[groups[0].label][1][:, 1]
     notes = [part.record.note for part in real.parts if part.record.note]
     steps = np.array([real.asked(delta) for delta in asked])
@@ -108,11 +115,17 @@ def reader_advice(
     )
 
 
+def parts_of_reader(groups: Sequence[EncoderGroup], confirm: bool) -> int:
+    """Guess the parts of the work for one reader: steps of a curve and two limits, by group."""
+    return len(groups) * (int(LIMIT.READER_DOWN) + len(LIMITS) * confirm)
+
+
 def curves(
     real: CoarseEncoders,
     selections: Mapping[str, tuple[int, ...]],
     start: float,
-    decisive: Sequence[int],
+    reference: Estimate,
+    work: Work,
 ) -> dict[str, tuple[Array, Array]]:
     """Compute, for each group of coarse encoders, how the estimate changes with their step.
 
@@ -120,7 +133,8 @@ def curves(
     with their standard deviations, shape (m, 2, b), %.
     """
     start = min(max(start, real.finest), float(real.coarsest.min()))
-    steps = ReadSteps(real, selections, start, decisive, {label: {} for label in selections})
+    ratios: dict[str, dict[float, Array]] = {label: {} for label in selections}
+    steps = ReadSteps(real, selections, start, reference, ratios, work)
     read_until_limits(steps)
     if real.reader.motion is None:
         read_locked_steps(steps)
@@ -140,18 +154,21 @@ class ReadSteps:
     selections : mapping
         Numbers of the encoders of each group, by label.
     start : float, rad or m
-    decisive : sequence of int
-        Parameters that decide.
+    reference : Estimate
+        Of the records as measured; it says which parameters decide, and by which changes.
     ratios : dict
         By label and exponent k: estimates at the phases of the encoders over the exact estimate,
         shape (phases, b).
+    work : Work
+        Counts the steps.
     """
 
     real: CoarseEncoders
     selections: Mapping[str, tuple[int, ...]]
     start: float
-    decisive: Sequence[int]
+    reference: Estimate
     ratios: dict[str, dict[float, Array]]
+    work: Work
 
     def step(self, k: float | Array) -> Array:
         """Compute the steps of exponents k, rad or m."""
@@ -178,6 +195,7 @@ class ReadSteps:
         for label, added in ratios.items():
             known = self.ratios[label]
             known[k] = np.concatenate([known[k], added]) if more else added
+        self.work.advance(len(own))
         return list(own)
 
     def exponents(self) -> list[float]:
@@ -189,8 +207,17 @@ class ReadSteps:
         return {k: mean_change(ratios) for k, ratios in sorted(self.ratios[label].items())}
 
     def worst(self, label: str, k: float) -> float:
-        """Compute the largest change of a deciding parameter at the step of exponent k, %."""
-        return float(np.abs(mean_change(self.ratios[label][k])[0, self.decisive]).max(initial=0.0))
+        """Compute the largest weighed change of a deciding parameter at the step of exponent k."""
+        return float(self.weighed(self.ratios[label][k])[0, self.decisive].max(initial=0.0))
+
+    @cached_property
+    def decisive(self) -> list[int]:
+        """Numbers of the parameters that decide."""
+        return deciding_columns(self.reference)
+
+    def weighed(self, ratios: Array) -> Array:
+        """Compute weighed change and standard deviation, shape (2, b), at one step."""
+        return weighed_change(mean_change(ratios), self.reference)
 
     def curve(self, label: str) -> tuple[Array, Array]:
         """Return steps, shape (m,), and changes with standard deviations, shape (m, 2, b), %."""
@@ -212,6 +239,8 @@ def read_until_limits(steps: ReadSteps) -> None:
         e = [steps.worst(label, k) for label in steps.read(k, groups)]
         if not e or min(e) > LIMITS[-1]:
             break
+        more = np.log(LIMITS[-1] / max(min(e), 1e-9)) / (2 * np.log(LIMIT.READER_RATIO))
+        steps.work.left = len(groups) * min(int(more), LIMIT.READER_UP - k)  # changes as Delta^2
 
 
 def read_locked_steps(steps: ReadSteps) -> None:
@@ -247,7 +276,8 @@ def vague_groups(
     """
     vague: dict[tuple[float, int], dict[str, None]] = {}
     for label, limit in product(steps.selections, LIMITS):
-        for k in vague_steps(steps.changes(label), steps.decisive, limit):
+        weighed = {k: steps.weighed(one) for k, one in sorted(steps.ratios[label].items())}
+        for k in vague_steps(weighed, steps.decisive, limit):
             phases = len(steps.ratios[label][k])
             if phases < LIMIT.PHASES_TAKEN and (label, k) not in exhausted:
                 vague.setdefault((k, phases), {})[label] = None
@@ -268,13 +298,13 @@ def vague_steps(
     changes: Mapping[float, Array], decisive: Sequence[int], limit: float
 ) -> list[float]:
     """Find which encoder steps near the limiting step have too uncertain a change of X. At the
-    limiting step, X changes by `limit` %, for instance 1 %.
+    limiting step, the weighed change of X is `limit`, for instance 1.
 
     The limiting step is between two steps. A step is returned if the standard deviation of its
     change moves the limiting step by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on
     logarithmic axes. If even the finest step is above the limit, only this step is judged.
 
-    changes : change and its standard deviation, shape (2, b), %, by exponent of the step,
+    changes : weighed change and its standard deviation, shape (2, b), by exponent of the step,
         ascending.
     """
     steps, e = list(changes), [np.abs(change[0]) for change in changes.values()]
@@ -306,19 +336,19 @@ def uncertain(read_as: str, advice: EncoderAdvice, error: Array, names: Sequence
         i = names.index(limit.parameter)
         e, apart = (
             np.abs(advice.change[:, i]),
-            np.maximum(LIMIT.PREDICTION_AGREES * limit.percent, 2 * error[:, i]),
+            np.maximum(LIMIT.PREDICTION_AGREES * limit.change, 2 * error[:, i]),
         )
-        first = advice.delta[(e < limit.percent - apart) & (advice.delta < limit.delta)].max(
+        first = advice.delta[(e < limit.change - apart) & (advice.delta < limit.delta)].max(
             initial=advice.delta[0]
         )
-        last = advice.delta[(e > limit.percent + apart) & (advice.delta > limit.delta)].min(
+        last = advice.delta[(e > limit.change + apart) & (advice.delta > limit.delta)].min(
             initial=advice.delta[-1]
         )
         if last > LIMIT.FLAT_CURVE * first:
             found.append(
                 f"Read as {read_as}, all encoders alike, from "
                 f"{step_text(first, advice.unit)} to {step_text(last, advice.unit)}: the predicted "
-                f"change of {limit.parameter} is {limit.percent:g} %, within the accuracy of the "
+                f"change of {limit.parameter} is {limit.change:.2g} %, within the accuracy of the "
                 "prediction. Simulate the encoder's own step: symgen cestac --rounding phase "
                 "--delta STEP."
             )

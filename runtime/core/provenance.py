@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import scipy
 
 from runtime.core.record import Record
 
@@ -41,6 +45,15 @@ def origin(records: Sequence[Record]) -> dict[str, Any]:
         **{key: texts for key, texts in said.items() if texts},
         **note,
     }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of symgen, numpy and scipy."""
+    try:
+        own = version("symgen")
+    except PackageNotFoundError:
+        own = "not installed"
+    return {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__}
 
 
 def processor() -> str:

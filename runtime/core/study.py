@@ -155,8 +155,8 @@ class Rows(Settings):
         tenth of it.
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise there.
-        auto: found from the record for joints whose torques at rest are not those of the model;
-        zero for other joints.
+        auto: found from the record for joints with dry friction in the model whose torques at rest
+        are not those of the model; zero for others.
     around : float, s
         Rows within this time of such a row are left out too; low_speed: auto sets it to the reach
         of the decimation.

@@ -105,7 +105,10 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
         raise SettingsError(
             f"step {finest:.4g} is not coarser than the step of encoder {coarsest + 1} of "
             f"{record.name}, {step[coarsest]:.4g}: rounding would only shift the counts, and the "
-            f"result would look too certain; set only steps above {step[coarsest]:.4g}",
+            f"result would look too certain; set only steps above {step[coarsest]:.4g}. The estimate "
+            "from the record has the effect of this encoder already: to see it, set rounding: "
+            "two-point at this step, which shows at least as much, or compare with signals: {reader: "
+            "counts}",
             path=("cestac", "delta"),
         )
     if finest >= (1 - 1e-9) * LIMIT.EXACT_FROM * step[coarsest]:
@@ -117,7 +120,8 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
             f"step {finest:.4g} is less than {LIMIT.EXACT_FROM:g} steps of encoder "
             f"{coarsest + 1} "
             f"({step[coarsest]:.4g}), so the study needs the counts of this encoder, "
-            f"which cannot be read: {e.message}",
+            f"which cannot be read: {e.message}; or set only steps of at least "
+            f"{LIMIT.EXACT_FROM * step[coarsest]:.4g}, for which the positions count as exact",
             file=record.name,
         ) from e
     return OwnEncoder(step, reading, own_drives)

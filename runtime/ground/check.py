@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import Any, Literal, NamedTuple, ParamSpec
 
+from runtime.ground.errors import MemoryTooSmallError
 from runtime.ground.limits import LIMIT
 
 State = Literal["good", "doubtful", "no", "open"]
@@ -84,7 +85,8 @@ class Question:
     """Decorator for a function that answers one question: the function then returns a Check.
 
     The decorator holds the question, the limit of a good answer and the remedy for other answers.
-    If the function returns None, the decorated function returns None too.
+    If the function returns None, the decorated function returns None too. If it needs more memory
+    than there is, the question is open, and the answer says what is needed.
     """
 
     question: str
@@ -96,7 +98,10 @@ class Question:
     def __call__(self, judge: Callable[P, Answer | None]) -> Callable[P, Any]:
         @wraps(judge)
         def check(*args: P.args, **options: P.kwargs) -> Check | None:
-            answer = judge(*args, **options)
+            try:
+                answer = judge(*args, **options)
+            except MemoryTooSmallError as e:
+                answer = Answer("open", f"Not judged: {e}", "")
             if answer is None:
                 return None
             limit = self.limit if answer.limit is None else answer.limit

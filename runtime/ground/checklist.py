@@ -65,9 +65,9 @@ class Checklist(Result):
         """Advice to the user: the remedy of the worst check, or how to use the parameters."""
         if self.worst is not None:
             return f"{self.worst.remedy}."
-        asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
+        asked = dict.fromkeys(c.remedy for c in self.checks if c.state == "open" and c.remedy)
         use = "use these parameters together, with their intervals"
-        return "; for the open questions, ".join([use, *asked]) + "."
+        return "; for the open questions, ".join([use, *filter(None, ["; ".join(asked)])]) + "."
 
     def _repr_html_(self) -> str:
         rows = [

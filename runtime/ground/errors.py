@@ -118,6 +118,10 @@ class ModelError(InputError):
     """Error: a module that is not an emitted (generated) model, or that lacks a needed function."""
 
 
+class MemoryTooSmallError(InputError):
+    """Error: work that needs more memory than is available."""
+
+
 class DataUnavailableError(InputError):
     """Error: a dataset that is neither on this machine nor at its source.
 

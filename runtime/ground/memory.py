@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 
 from runtime.ground import progress
-from runtime.ground.errors import InputError
+from runtime.ground.errors import MemoryTooSmallError
 from runtime.ground.limits import LIMIT
 
 GB = 1e9
@@ -23,13 +23,13 @@ def require_memory(needed: float, what: str, remedy: str) -> None:
 
     what : what needs them, such as "the rows of the records". remedy : what to do, for the message.
 
-    InputError, with both numbers and the remedy, if less is available.
+    MemoryTooSmallError, with both numbers and the remedy, if less is available.
     """
     if needed < SMALL:
         return
     most = available_memory()
     if needed > most:
-        raise InputError(
+        raise MemoryTooSmallError(
             f"{what} need about {needed / GB:.2g} GB of memory, and {most / GB:.2g} GB are available; {remedy}"
         )
     if needed > LIMIT.MEMORY_TOLD * GB:

@@ -44,6 +44,11 @@ class Checkpoint:
         self._runs: list[Runs] = []
         self._last = monotonic()
 
+    @property
+    def kept(self) -> str:
+        """What is on disk: the number of runs and their file; "" if there are none."""
+        return f"{self.written} runs are in {self.file}" if self.written else ""
+
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
         """Return the runs that were stored before an interruption, with b parameters each.
 

@@ -50,9 +50,8 @@ def processes(count: int) -> Iterator[Map]:
             partial(_there, bytes(ForkingPickler.dumps(function))), keys
         )
     except BrokenProcessPool as e:
-        raise InputError(
-            'a process died: the memory is full, or the script has no `if __name__ == "__main__":`; use fewer workers'
-        ) from e
+        died = 'a process died: the memory is full, or the script has no `if __name__ == "__main__":`; use fewer workers'
+        raise InputError("; ".join([died, *getattr(e, "__notes__", ())])) from e
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -18,7 +18,7 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
 from runtime.core.signals.cutoff import noise_share
 from runtime.core.study import Study
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, MemoryTooSmallError
 from runtime.ground.limits import limits
 from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
@@ -103,24 +103,32 @@ class Case:
         """List the labels of the joints that the mask `chosen` selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
-    def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
+    def reaching(
+        self, values: Array, units: Sequence[str], chosen: Array, limits: Array | None = None
+    ) -> str:
         """Write the values that the selected joints reach, such as "Largest values: 3 rad (joint 2)".
 
-        At most four joints are named. If the mask selects none, the joint with the largest value is
-        named.
+        At most four joints are named, with their limits: "(joint 2, limit 1)". If the mask selects
+        none, the joint with the largest value is named, without its limit.
         """
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
-        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
+        limit = [""] * len(values)
+        if limits is not None and chosen.any():
+            limit = [f", limit {x:.3g}" for x in limits]
+        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]}{limit[j]})" for j in shown)
         return f"Largest values: {', '.join(each)}"
 
     @cached_property
     def observation(self) -> Observation | None:
         """Observation matrix W and torques Y of all records, with the study as given.
 
-        None if they cannot be computed, for instance if no row is left.
+        None if they cannot be computed, for instance if no row is left. MemoryTooSmallError if they do
+        not fit the memory.
         """
         try:
             return stacked(self.model, self.given)
+        except MemoryTooSmallError:
+            raise
         except (InputError, np.linalg.LinAlgError):
             return None
 

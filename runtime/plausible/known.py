@@ -13,7 +13,8 @@ is the ratio of the weights. No record shows a factor of this force: the mass hi
 A second question: are the measured torques really torques? Motor currents change in time as the
 computed torques do, but have another size.
 
-    slope_j = Y_j'W_j X_0 / ||W_j X_0||^2,    alike_j = Y_j'W_j X_0 / (||Y_j|| ||W_j X_0||),
+    slope_j = y_j'w_j / ||w_j||^2,    alike_j = y_j'w_j / (||y_j|| ||w_j||),
+            w_j = W_j X_0 and y_j = Y_j without their parts that friction and offset explain,
             X_0 the base parameters of the file's values
 
 Values of a maker's file are right to tens of per cent. If the measured torque of a joint is similar
@@ -113,19 +114,27 @@ class KnownValues(Result):
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 
     @property
-    def factor(self) -> float | None:
-        """Common factor of all measured torques, as another unit or side of the gears makes it.
+    def factors(self) -> dict[str, float]:
+        """Factors of the measured torques by joint, as another unit or side of the gears makes them.
 
-        It is the median ratio of measured to computed torques, if all ratios are nearly alike
-        (within LIMIT.CAD_RATIOS of the median) and far below 1; None otherwise.
+        They are the ratios of measured to computed torques, if all are far below 1: each joint may
+        have a gear of its own, which multiplies its gravity and its inertia torque alike (within
+        LIMIT.CAD_RATIOS). Empty otherwise.
         """
-        ratios = np.concatenate([self.gravity, self.inertia])
-        ratios = ratios[np.isfinite(ratios)]
-        if len(ratios) < 3 or (ratios <= 0).any():
-            return None
-        median, (low, high) = float(np.median(ratios)), LIMIT.CAD_RATIOS
-        alike = ((low <= ratios / median) & (ratios / median <= high)).all()
-        return median if alike and median < LIMIT.OTHER_UNIT else None
+        low, high = LIMIT.CAD_RATIOS
+        found: dict[str, float] = {}
+        both = np.column_stack([self.gravity, self.inertia])
+        if np.isfinite(both).sum() < 3:
+            return {}
+        for joint, ratios in zip(self.joints, both, strict=True):
+            known = ratios[np.isfinite(ratios)]
+            if not len(known):
+                continue
+            mean = float(np.exp(np.log(known).mean())) if (known > 0).all() else np.nan
+            if not (mean < LIMIT.OTHER_UNIT and known.max() <= high / low * known.min()):
+                return {}
+            found[joint] = mean
+        return found
 
     @property
     def off(self) -> tuple[str, ...]:
@@ -240,15 +249,23 @@ def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: b
         )
     )
     slopes: dict[str, float] = {}
+    losses = [
+        k
+        for k, name in enumerate(observation.names)
+        if elements_of(model).get(name, ("inertia",))[0] != "inertia"
+    ]
     for j, label, joint in zip(
         model.JOINTS, joint_labels(model), observation.factor.joints, strict=True
     ):
-        expected, measured = joint.R[:, :-1] @ X0[joint.columns], joint.R[:, -1]
-        size, both = float(expected @ expected), float(expected @ measured)
+        R, measured = joint.R[:, :-1], joint.R[:, -1]
+        friction = R[:, np.isin(joint.columns, losses)]
+        parts = np.column_stack([R @ X0[joint.columns], measured])
+        left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
+        size, both = float(left[:, 0] @ left[:, 0]), float(left[:, 0] @ left[:, 1])
         if (
             size > 0
             and not is_axis(j)
-            and both > LIMIT.TORQUE_ALIKE * np.sqrt(size) * joint.measured_norm
+            and both > LIMIT.TORQUE_ALIKE * np.sqrt(size) * np.linalg.norm(left[:, 1])
             and not 1 / LIMIT.TORQUE_FACTOR < both / size < LIMIT.TORQUE_FACTOR
         ):
             slopes[label] = both / size

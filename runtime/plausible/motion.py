@@ -28,7 +28,7 @@ from runtime.core.rows.selection import per_joint
 from runtime.core.signals.velocities import agreement
 from runtime.core.study import Signals, Study
 from runtime.ground.check import Answer, Question, State, first_names
-from runtime.ground.errors import InputError
+from runtime.ground.errors import InputError, MemoryTooSmallError
 from runtime.ground.limits import limits
 from runtime.plausible.case import Case
 from runtime.plausible.rests import friction_determined, rounded_up
@@ -62,6 +62,8 @@ def rest(case: Case) -> Answer:
         without = stacked(
             model, [one.by(study_of_record(moving, one.record)) for one in case.given]
         )
+    except MemoryTooSmallError:
+        raise
     except InputError:
         without = None
     if case.observation is None or without is None:

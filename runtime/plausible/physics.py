@@ -153,14 +153,15 @@ def values(case: Case) -> Answer | None:
     """
     if case.robot_values is None:
         return None
-    if factor := case.robot_values.factor:
+    if factors := case.robot_values.factors:
         return Answer(
             "no",
-            f"The measured torques of all joints are about {factor:.2g} times those computed from the "
-            "values",
-            "check the unit and the side of the torques: currents need record.torque_constant, "
-            "torques of the motor side need the gear ratio (drives.ratio with record.torque_side: "
-            "motor, or record.scale: {tau: ratio})",
+            f"The measured torques of joint {', '.join(factors)} are "
+            f"{', '.join(f'{x:.2g}' for x in factors.values())} times those computed from the values",
+            "check the unit and the side of the torques: a torque constant must include the gear ratio "
+            "(record.torque_constant), currents need one, and torques of the motor side need the ratio "
+            "(drives.ratio with record.torque_side: motor, or record.scale: {tau: ratio})",
+            explains=1 - max(factors.values()),  # the rest has the size of the values
         )
     if off := case.robot_values.off:
         return Answer("doubtful", f"No: {'; '.join(off[:4])}")

@@ -245,6 +245,9 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         trials = try_causes(case.baseline, case.sides, case.column_units)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.cause.kind != "rate"]
+        if case.robot_values is not None and case.robot_values.factors:
+            # factors of single joints are differences of their gears
+            trials = [t for t in trials if t.cause.kind != "factor"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
             text = (
                 "Not checked: with other angles or lengths the loops of the robot file "

@@ -37,6 +37,8 @@ Array = np.ndarray
 KIND = "rests"
 OWN = ("viscous", "coulomb", "offset")
 """Kinds of elements whose parameters the rows of their joint must determine."""
+SMOOTH = ("inertia", "viscous", "offset", "stiffness", "cubic")
+"""Kinds of elements whose torques do not jump with the direction of motion."""
 
 
 def rows_at_rest(problem: Problem) -> Problem:
@@ -85,7 +87,8 @@ def resting(problem: Problem) -> tuple[Array, Array]:
     """Find the speed below which each joint rests, and the share of its rows in which it does.
 
     Return speeds in rad/s or m/s, shape (n,), zero for a joint that rests in few rows, that never
-    moves, or that is an axis of a force sensor; and the shares, shape (n,).
+    moves, that has no dry friction in the model, or that is an axis of a force sensor; and the
+    shares, shape (n,).
     """
     rows = [
         (np.abs(own.states.qd[own.selection.samples][own.selection.kept]), own.selection.mask.T)
@@ -97,9 +100,16 @@ def resting(problem: Problem) -> tuple[Array, Array]:
     share = np.asarray(standing / np.maximum(sum(used.sum(axis=0) for _, used in rows), 1))
     rests = (share > LIMIT.REST_SHARE) & [not is_axis(joint) for joint in problem.model.JOINTS]
     if rests.any():
+        rests &= dry_friction(problem.model)
         median = problem.settings.signals.median
         rests &= ~np.all([stands(r.q, r.rate, median) for r in problem.records], axis=0)
     return np.where(rests, low, 0.0), share
+
+
+def dry_friction(model: GeneratedModel) -> Array:
+    """Tell of which joints the model has dry friction, or another law that may, bool, shape (n,)."""
+    laws = [axes for kind, _, axes in elements_of(model).values() if kind not in SMOOTH]
+    return np.array([any(j in axes for axes in laws) for j in model.JOINTS])
 
 
 def rounded_up(x: float) -> float:

@@ -255,7 +255,7 @@ def _signals(
     signals = {}
     for key, (place, names) in asked.items():
         positions = key == "q"
-        hint = f", or repair or cut the record; {COUNTS}" if positions else ""
+        hint = f"; repair or cut the record{f'; {COUNTS}' if positions else ''}"
         values = chosen[place].read(names, empty=missing and positions, hint=hint)
         signals[key] = Signal(chosen[place], names, values)
     return signals

@@ -553,8 +553,8 @@ class Rows(chapter.Rows):
     ----------
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm. auto: found from the record for joints whose
-        torques at rest are not those of the model; zero for other joints.
+        them. A text may have another unit: 2 rpm. auto: found from the record for joints with dry
+        friction in the model whose torques at rest are not those of the model; zero for others.
     """
 
     _with_unit = field_validator("low_speed", mode="before")(speed)

@@ -93,8 +93,8 @@ def resolution_page(result: Cestac, study: str) -> Page:
     enough = result.enough
     return replace(
         page,
-        question="Which resolution is enough?",
-        answer=enough.label if enough else "None of the steps tried",
+        question="Which of the encoder steps tried is enough?",
+        answer=enough.text(result.unit) if enough else "None of the steps tried",
         state="good" if enough else "no",
     )
 
@@ -203,18 +203,17 @@ def resolution_section(
 def level_numbers(result: Cestac) -> list[Number]:
     """Write, for each encoder or torque step, the verdict and the largest error, %.
 
-    The error is that of a parameter or of the residual. Encoder steps are given in counts per turn
-    and bits too. The numbers are for the head of a page.
+    The error is that of a parameter. Encoder steps are given in counts per turn and bits too. The
+    numbers are for the head of a page.
     """
     states: dict[str, State] = {"unbiased": "good", "doubtful": "doubtful", "biased": "no"}
-    turns = not {*result.reference.units.values()} & {"N*s/m", "kg"}
     numbers = []
     for level in result.levels:
-        label, delta = level.level.label, level.level.delta
-        if turns and delta and not level.level.torque:
+        label, delta = level.level.text(result.unit), level.level.delta
+        if result.unit == "rad" and delta and not level.level.torque:
             counts = 2 * pi / delta
             label += f": {counts:.0f} counts per turn, {log2(counts):.1f} bits"
-        name, error = next(iter(level.decided_by.items()), ("rho", 0.0))
-        most = f"{'residual' if name == 'rho' else name} {error:.1f} %"
+        name, error = next(iter(level.decided_by.items()))
+        most = f"{name} {error:.1f} %"
         numbers.append(Number(label, f"{level.verdict}, {most}", states[level.verdict]))
     return numbers

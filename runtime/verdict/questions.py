@@ -17,10 +17,13 @@ import numpy as np
 
 from runtime.core.essential import lost_joints
 from runtime.core.result import Identification
-from runtime.ground.check import Answer, Check, Question, State, first_names, state_of
+from runtime.ground.check import WORST, Answer, Check, Question, State, first_names, state_of
 from runtime.ground.limits import limits
 
 LIMIT = limits(__package__)
+
+COUNT_VALUES = "set validate: {values: true} in the study, so that single values count"
+"""What answers an open question about single values."""
 
 
 def of_single_values(question: Callable[[Identification], Check | None]) -> Callable[..., Any]:
@@ -37,7 +40,7 @@ def of_single_values(question: Callable[[Identification], Check | None]) -> Call
         if check is None or counts or check.state == "good":
             return check
         finding = f"Single values do not count in this verdict. {check.finding}; {check.remedy}"
-        return replace(check, state="open", finding=finding, remedy="")
+        return replace(check, state="open", finding=finding, remedy=COUNT_VALUES)
 
     return asked
 
@@ -239,9 +242,17 @@ def separate(result: Identification) -> Answer:
 
 
 def determined(result: Identification) -> Check | None:
-    """Ask whether the record determines the parameters, unless only a bad condition is in doubt."""
-    check = rank_and_condition(result)
-    return None if check.state == "doubtful" else check
+    """Ask whether the record determines the parameters, unless only a bad condition is in doubt.
+
+    If a part has found a cause by which most values mean nothing, such as joints that rest in all
+    records, its remedy comes first.
+    """
+    check: Check = rank_and_condition(result)
+    if check.state != "no":
+        return None if check.state == "doubtful" else check
+    known = (c for part in result.parts if part.about == "record" for c in part.checks())
+    cause = next((c for c in known if c.ahead and c.state in WORST[:2]), None)
+    return check if cause is None else replace(check, remedy=cause.remedy)
 
 
 @of_single_values

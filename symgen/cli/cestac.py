@@ -100,7 +100,7 @@ def cestac(
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:
-            with session.progress_bar("encoders" if advise else "runs") as progress:
+            with session.progress_bar("steps" if advise else "runs") as progress:
                 if advise:
                     asked, real = study.cestac.delta if delta else (), rounding in (None, "phase")
                     judged = encoder_readers(READERS, study.signals.reader) if real else {}
@@ -121,7 +121,7 @@ def cestac(
                         )
                     said, good = resolution.message, resolution.verdict != "biased"
         except KeyboardInterrupt:
-            session.stopped(checkpoint)
+            session.stopped("" if checkpoint is None else checkpoint.kept)
         if results is not None:
             runtime.report(result, results, study=study)
         if checkpoint is not None and isinstance(result, runtime.Cestac) and result.lists_runs:

@@ -23,6 +23,7 @@ def compare(
     ] = None,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    base: options.Base = None,
     json: options.Json = False,
 ) -> None:
     """Identify ROBOT with the settings of each STUDY, and rank the studies by how well they predict
@@ -36,15 +37,16 @@ def compare(
         from runtime.ground.documents import json_text
         from runtime.ground.errors import InputError
 
-        described = session.robot_of(robot, trust=trust, exact=exact)
+        described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         if len(study) < 2:
             raise InputError(f"{study[0]}: one study; name two or more study files to compare")
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
-        described = session.corrected(described, next(iter(candidates.values())))
-        model = session.model_of(described)
+        first = next(iter(candidates.values()))
+        described = session.corrected(described, first)
+        model = session.model_of(described, study=first)
         ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
         if results is not None:
             runtime.report(ranking, results)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import NEGATIVE, described_robot, fail, reported_errors
 from symgen.emit.targets import TARGETS
+
+if TYPE_CHECKING:
+    from symgen.description import Robot
 
 
 def generate(
@@ -99,6 +102,7 @@ def emitted(
 
     Raises SymgenError before any file is written.
     """
+    from runtime.ground.check import first_names
     from symgen.certify.modules import certified_files
     from symgen.derive.loops import close
     from symgen.description import packaged_robots
@@ -127,6 +131,14 @@ def emitted(
             elif target.use:
                 file = target.file.format(robot.name, "*")
                 typer.echo(f"{file}: {target.use.format(robot.name)}", err=True)
+        for name in targets:
+            if TARGETS[name].values and (missing := missing_values(robot)):
+                typer.echo(
+                    f"{TARGETS[name].file.format(robot.name)}: no {TARGETS[name].values.format(robot.name)}, "
+                    f"because the robot file has no value of {first_names(missing)}; pass your own X, in "
+                    f"the order of {robot.name}_parameters",
+                    err=True,
+                )
         if robot.loaded:
             typer.echo(
                 f"{robot.name}: no forward_dynamics: laws of {', '.join(robot.loaded)} use "
@@ -135,6 +147,14 @@ def emitted(
             )
         modules |= files
     return modules
+
+
+def missing_values(robot: Robot) -> list[str]:
+    """List the standard parameters that the base parameters contain and the robot file does not give."""
+    from symgen.regroup.regrouping import regroup
+
+    used = {name for b in regroup(robot).base for name in b.combination}
+    return [name for name in robot.parameters if name in used and name not in robot.values]
 
 
 def report_differences(output: Path, modules: dict[str, str]) -> None:

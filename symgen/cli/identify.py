@@ -76,8 +76,8 @@ def identify(
     json: options.Json = False,
 ) -> None:
     """Identify the base parameters of ROBOT from RECORD, or from several records fitted together.
-    The exit code is 0 for the verdicts Yes and With care, 1 for No, and 1 if --suggest leaves
-    settings to be filled in.
+    The exit code is 0 for the verdicts Yes and With care, and 1 for No. If --suggest leaves settings
+    to be filled in, the command says which, and ends with exit code 0.
     """
     if each and (output is None or repair is not None or json or verbose):
         session.fail("--each needs -o FOLDER, and goes without --repair, --json and --verbose")
@@ -94,7 +94,8 @@ def identify(
         study = study if at is None else session.changed(study, payload={"at": at})
         robot_file, described = described, session.corrected(described, study)
         model = session.model_of(described, study=study)
-        study = study if suggest is None else session.suggested_study(study, model, suggest)
+        if suggest is not None:
+            study = session.suggested_study(study, model, suggest, robot, json=json)
         asked: dict[str, Any] = {"physical": physical, "friction": friction, "plausible": plausible}
         if each and output is not None:
             variants = session.variants_of(described) if plausible else None

@@ -23,6 +23,7 @@ def report(
         ),
     ] = None,
     side: options.Side = None,
+    columns: options.Columns = None,
     trust: options.Trust = False,
     exact: options.Exact = False,
     base: options.Base = None,
@@ -32,6 +33,8 @@ def report(
 
     A part that cannot be done is named on the page with its reason. Exit code 1 if the values
     cannot be used.
+
+    With --columns, only the named parameters decide whether the encoder is fine enough.
     """
     with session.results_in(output) as results:
         import runtime
@@ -39,7 +42,8 @@ def report(
         from runtime.ground.documents import json_text
 
         described = session.robot_of(robot, trust=trust, exact=exact, base=base)
-        study = session.changed(session.study_of_arguments(record), cestac={"side": side})
+        judged = {"side": side, "columns": session.names_of(columns)}
+        study = session.changed(session.study_of_arguments(record), cestac=judged)
         described = session.corrected(described, study)
         model = session.model_of(described, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta

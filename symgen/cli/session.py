@@ -11,22 +11,23 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import timedelta
 from itertools import groupby, pairwise
 from pathlib import Path
+from shlex import join
 from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from symgen.cli.told import as_json, counter, error_data, tell
+from symgen.cli.told import as_json, counter, error_data, lines_of, tell, time_left
 from symgen.update.models import corrected as corrected
 from symgen.update.models import model_of as model_of
 from symgen.update.models import variants_of as variants_of
 
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
-    from runtime.parallel.checkpoint import Checkpoint
     from runtime.reporting.result_files import Results
     from runtime.study import Study
     from symgen.description import Robot
@@ -330,12 +331,19 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     return study
 
 
-def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
-    """Correct the settings that prevent reading the records, and write the new study to `path`.
+def suggested_study(
+    study: Study, model: GeneratedModel, path: Path, robot: str, *, json: bool = False
+) -> Study:
+    """Write a study with the settings that the records need to `path`, and say what it sets.
 
-    What names and values do not show is marked `# ?` in the file; the command then ends with code 1.
+    What names and values do not show is marked `# ?` in the file; the command then ends here, with
+    exit code 0, and says what to fill in and how to go on.
+
+    robot : argument ROBOT, for the next command.
+    json : whether the output has JSON only; what is said then goes to the error stream.
     """
     from runtime.compose import reader_of
+    from runtime.ground.documents import json_text
     from runtime.ground.errors import InputError
     from runtime.reporting.result_files import write_all
     from runtime.study import suggested
@@ -347,13 +355,24 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     folder = path.resolve().parent
     found = suggested(study, model, missing=reader_of(study.signals).missing)
     write_all(folder, {path.name: found.text(folder)})
-    for text in found.sentences:
-        say(text)
+    said = [f"{path} is written.", *(f"- {text}" for text in found.sentences)]
     if found.unrecognised:
-        say(f"{path} written; not recognised: {', '.join(found.unrecognised.values())}")
-        say(f"complete the lines marked # ?, then run symgen identify ROBOT {path}")
-        raise typer.Exit(NEGATIVE)
-    say(f"{path} written; check this file before you trust the values")
+        said += [
+            f"Fill in what the record does not show, marked # ? in {path}:",
+            *(f"- {text}" for text in found.unrecognised.values()),
+            f"Next: {join(['symgen', 'identify', robot, str(path)])}",
+        ]
+    else:
+        said += ["Check this file before you trust the values."]
+    if json:
+        for line in said:
+            say(line)
+    else:
+        show("\n".join([*said, *([] if found.unrecognised else [""])]))
+    if found.unrecognised:
+        if json:
+            show(json_text({"study": str(path), "fill_in": found.unrecognised}), json=True)
+        raise typer.Exit(0)
     return found.study
 
 
@@ -385,13 +404,9 @@ def names_of(text: str | None) -> str | list[str] | None:
     return text if text in (None, "essential", "all") else text.split(",")
 
 
-def stopped(checkpoint: Checkpoint | None) -> NoReturn:
-    """End the command after Ctrl-C with exit code 130; say how many runs of a study are saved."""
-    rest = (
-        f"{checkpoint.written} runs are in {checkpoint.file}: repeat the command to continue"
-        if checkpoint and checkpoint.written
-        else "nothing is kept"
-    )
+def stopped(kept: str) -> NoReturn:
+    """End the command after Ctrl-C with exit code 130; say what is kept, "" for nothing."""
+    rest = f"{kept}: repeat the command to continue" if kept else "nothing is kept"
     typer.echo(f"stopped; {rest}", err=True)
     raise typer.Exit(INTERRUPTED)
 
@@ -428,10 +443,13 @@ def progress_bar(what: str) -> Iterator[Any]:
     """Show a progress bar of `what` on the error stream for the duration of the block.
 
     Yield a function of the number of finished steps and the number of all steps, which updates the
-    bar.
+    bar. Where the error stream is no terminal, a line every ten seconds takes its place.
     """
     if as_json():
         yield counter()
+        return
+    if not sys.stderr.isatty():
+        yield lines_of(what)
         return
     from rich import progress as rich
     from rich.console import Console
@@ -440,8 +458,15 @@ def progress_bar(what: str) -> Iterator[Any]:
         rich.TextColumn("{task.description}"),
         rich.BarColumn(),
         rich.MofNCompleteColumn(),
-        rich.TimeRemainingColumn(),
+        rich.TextColumn("{task.fields[left]}"),
     )
+    left = time_left()
     with rich.Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        task = progress.add_task(what, total=None, left="")
+
+        def update(done: int, total: int) -> None:
+            seconds = left(done, total)
+            text = "" if seconds is None else f"{timedelta(seconds=round(seconds))} left"
+            progress.update(task, completed=done, total=total, left=text)
+
+        yield update

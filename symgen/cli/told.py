@@ -3,7 +3,7 @@
 SYMGEN_LINES=json symgen cestac arm.urdf study.yaml 2> lines.jsonl
 
 {"stage": "identification"}                     a part of the work begins
-{"done": 3, "total": 40}                        runs, encoders or starts
+{"done": 3, "total": 40, "left_s": 61.2}        runs, records or starts; time that the others need, or null
 {"note": "..."}                                 a doubt about robot or record
 {"report": "results/report.html"}               what was written
 {"error": "...", "path": ["signals", "rate"]}   why the command ends; keys of the wrong setting
@@ -21,6 +21,7 @@ import typer
 
 LINES = "SYMGEN_LINES"
 PAUSE = 0.1  # s between two counts
+LINE_PAUSE = 10.0  # s between two lines
 
 
 def as_json() -> bool:
@@ -43,14 +44,48 @@ def error_data(error: Exception) -> dict[str, Any]:
     return {"error": text or str(error) or type(error).__name__, "path": path}
 
 
-def counter() -> Callable[[int, int], None]:
-    """Return a function that tells the numbers of finished steps and of all steps, ten times a s."""
-    last = 0.0
+def lines_of(what: str) -> Callable[[int, int], None]:
+    """Return a function that prints how much is done and the time left, every ten seconds."""
+    start = last = monotonic()
 
     def count(done: int, total: int) -> None:
         nonlocal last
-        if done == total or monotonic() - last > PAUSE:
-            last = monotonic()
-            tell("", done=done, total=total)
+        now = monotonic()
+        if 0 < done < total and now - last > LINE_PAUSE:
+            last = now
+            left = (now - start) / done * (total - done)
+            tell(f"  {what}: {done} of {total}, about {left:.0f} s left")
 
     return count
+
+
+def counter() -> Callable[[int, int], None]:
+    """Return a function that tells the numbers of finished steps and of all steps, ten times a s."""
+    last, left = 0.0, time_left()
+
+    def count(done: int, total: int) -> None:
+        nonlocal last
+        seconds = left(done, total)
+        if done == total or monotonic() - last > PAUSE:
+            last = monotonic()
+            tell("", done=done, total=total, left_s=seconds)
+
+    return count
+
+
+def time_left() -> Callable[[int, int], float | None]:
+    """Return a function of the numbers of finished steps and of all steps: time of the others, s.
+
+    (total - done) (t - t0)/(done - done0); t0 and done0 are those of the first call, so that steps
+    which were finished before do not count. None while no step is finished since then.
+    """
+    first: list[tuple[float, int]] = []
+
+    def left(done: int, total: int) -> float | None:
+        now = monotonic()
+        if not first:
+            first.append((now, done))
+        start, before = first[0]
+        return (total - done) * (now - start) / (done - before) if done > before else None
+
+    return left

@@ -20,6 +20,7 @@ from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError, require
 
+LOOPS_ENDING = ".loops.yaml"
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
 BASES = ("fixed", "moving", "free")
 WRITTEN = (".yaml", ".yml", ".urdf")  # suffixes of the formats that are written
@@ -251,6 +252,13 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
     return read
 
 
+def is_loops_file(name: str) -> bool:
+    """Whether a file of this name has the loops of a URDF or MJCF beside it."""
+    from symgen.description.loops_file import EXPORTED  # numpy
+
+    return name.lower().endswith((LOOPS_ENDING, EXPORTED))
+
+
 def loops_beside(path: Path) -> Any:
     """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
 
@@ -263,7 +271,7 @@ def loops_beside(path: Path) -> Any:
     if path.resolve().parent.name == "urdf":
         above = path.resolve().parent.parent
         folders += [above, above / "config"]
-    places = [path.with_suffix(".loops.yaml"), *(folder / EXPORTED for folder in folders)]
+    places = [path.with_suffix(LOOPS_ENDING), *(folder / EXPORTED for folder in folders)]
     found = next((place for place in places if place.is_file()), None)
     return None if found is None else LoopsText(found.name, content_of(found))
 
@@ -320,5 +328,5 @@ def content_of(path: Path) -> bytes:
         reason = getattr(error, "strerror", None) or error
         raise DescriptionError(
             f"cannot read {shown}: {reason}; expected a robot file or one of {names}",
-            file=path.name,
+            file=path.name or shown,  # the folder . has no name
         ) from error

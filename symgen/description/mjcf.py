@@ -341,7 +341,9 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     mjcf, angles = compiled(content), Angles(exact)
     model = mjcf.model
     if model.njnt > MAX_JOINTS:
-        raise DescriptionError(f"the file has {model.njnt} joints; the limit is {MAX_JOINTS}")
+        raise DescriptionError(
+            f"the file has {model.njnt} joints that move; the limit is {MAX_JOINTS}"
+        )
     for what, values in (
         ("pos of a body", model.body_pos),
         ("mass of a body", model.body_mass),

@@ -22,7 +22,7 @@ from symgen.description.expression import Expression
 from symgen.errors import DescriptionError
 
 Array = np.ndarray
-MAX_JOINTS, SHOWN = 200, 20  # of a file; names in a message
+MAX_JOINTS, SHOWN = 200, 20  # that move, of a file; names in a message
 DROPPED = "not read:"  # how the note on elements that are left out starts
 EARTH = 9.81  # m/s^2, along -z of the root link
 HINGE = "hinge"  # kind of a loop: revolute, about the direction of all other hinges around it

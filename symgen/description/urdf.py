@@ -105,9 +105,9 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
                     for key, default in (("multiplier", "1"), ("offset", "0"))
                 )
                 mimics[joints[-1].name] = leader, factor * Expression.symbol(leader) + offset
-    if len(joints) > MAX_JOINTS:
+    if (moving := sum(joint.kind != FIXED_TYPE for joint in joints)) > MAX_JOINTS:
         raise DescriptionError(
-            f"the file has {len(joints)} joints; the limit is {MAX_JOINTS}", line=root.line
+            f"the file has {moving} joints that move; the limit is {MAX_JOINTS}", line=root.line
         )
     rotors, unread = _rotors(root)
     joints = [replace(joint, armature=rotors.get(joint.name, 0.0)) for joint in joints]

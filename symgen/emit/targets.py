@@ -26,6 +26,9 @@ class Target(NamedTuple):
         whose positions only the closure equations define.
     bases : tuple of str
         Kinds of base (`Robot.base`) whose models the file can have.
+    values : str
+        Name of X of the robot file in the file, which lacks it without these values, if no other
+        function of the file computes X; {} stands for the name of the robot.
     """
 
     file: str
@@ -33,6 +36,7 @@ class Target(NamedTuple):
     use: str = ""
     iterates: bool = False
     bases: tuple[str, ...] = ("fixed", "moving", "free")
+    values: str = ""
 
 
 JOINT_ROWS = ("fixed", "moving")
@@ -41,7 +45,7 @@ TARGETS = {
     "casadi": Target(
         "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
     ),
-    "c": Target("{}.c", "C", iterates=True, bases=JOINT_ROWS),
+    "c": Target("{}.c", "C", iterates=True, bases=JOINT_ROWS, values="{}_values"),
     "h": Target(
         "{}.h",
         "C",

@@ -16,6 +16,8 @@ from symgen.emit.spec import function, is_inertial, is_inertial_or_actuator
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import BaseParameter, Formula, Regrouping
 
+SIGNS = "XY = -sum m x y, XZ and YZ likewise, about the origin of the link frame, as ixy of a URDF; MX = sum m x"
+
 
 def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
     """Print the formulas of the base parameters as text, latex, json or recursive (link by link).
@@ -69,6 +71,8 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
         *wrap_text("identified singly: " + alone, ""),
         "",
         *wrap_text("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""),
+        "",
+        *wrap_text(f"signs: {SIGNS}", ""),
     ]
 
 

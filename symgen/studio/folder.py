@@ -1,7 +1,8 @@
 """The work folder of the studio: ordinary files, whose names never come from the browser.
 
     robot.urdf, .xml, .par    the user's own file
-    robot.yaml                the table of frames, after an edit; it then is the robot
+    robot.loops.yaml          the loops of a URDF or MJCF, as they stood beside it
+    robot.yaml                the table of frames, after an edit or with these loops; it then is the robot
     robot.draft.yaml          an edit that does not describe a robot yet
     record/run.csv, validation/other.csv    measured files, with the names that they came with
     study.yaml                meaning of the record, and settings of its evaluation
@@ -36,10 +37,18 @@ from runtime.reading.formats import file_extensions, is_measured
 from runtime.reporting.result_files import write_all
 from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
-from symgen.description.files import content_of, load_robot
+from symgen.description.files import (
+    TREES,
+    content_of,
+    is_loops_file,
+    load_robot,
+    loops_beside,
+    write_robot,
+)
 
 ROBOT_ENDINGS = (".yaml", ".urdf", ".xml", ".par")  # the first one that is there is the robot
 OTHER_ENDINGS = {".yml": ".yaml", ".mjcf": ".xml"}
+LOOPS = "robot.loops.yaml"
 DRAFT = "robot.draft.yaml"
 MOST_KEPT = 300  # robots and studies before the present one
 RECORDS_KEPT = 3  # before the present one
@@ -120,7 +129,7 @@ class WorkFolder:
         remove(before[-1])
 
     def _remove_robot(self) -> None:
-        for name in (DRAFT, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
+        for name in (DRAFT, LOOPS, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
             (self.path / name).unlink(missing_ok=True)
 
     def take_robot(self, name: str, content: bytes) -> None:
@@ -132,6 +141,15 @@ class WorkFolder:
         self._remove_robot()
         self.write(robot_file(name), content)
 
+    def take_loops(self, content: bytes, table: str) -> None:
+        """Use the content of a file with loops beside the user's own URDF or MJCF.
+
+        table : text of the robot file (.yaml) of both.
+        """
+        self._keep_robot()
+        (self.path / DRAFT).unlink(missing_ok=True)
+        write_all(self.path, {LOOPS: content, "robot.yaml": table})
+
     def _keep_robot(self) -> None:
         self.keep("robot")
         remove(self.path / "history" / "undone")
@@ -142,12 +160,14 @@ class WorkFolder:
         source : name or path from the command line. SymgenError if it is no robot.
         """
         with warnings.catch_warnings(action="ignore"):  # the page tells them
-            load_robot(source)
+            robot = load_robot(source)
         packaged = files("symgen.description") / "robots" / f"{source}.yaml"
         if source in packaged_robots():
             self.take_robot("robot.yaml", packaged.read_bytes())
         else:
             self.take_robot(source, content_of(Path(source)))
+            if Path(source).suffix.lower() in TREES and (beside := loops_beside(Path(source))):
+                self.take_loops(beside.content, write_robot(robot, "robot.yaml")[0])
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
         """Save an edited robot table: as the robot file if it is valid, else as a draft.
@@ -311,10 +331,13 @@ class WorkFolder:
 
 
 def robot_file(name: str) -> str:
-    """Return the file name in the work folder for a robot file, such as robot.urdf for arm.urdf.
+    """Return the file name in the work folder for a robot file, such as robot.urdf for arm.urdf, or
+    for a file with loops.
 
     InputError if `name` has no ending of a robot file.
     """
+    if is_loops_file(name):
+        return LOOPS
     ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
     if ending not in ROBOT_ENDINGS:
         raise InputError(

@@ -30,7 +30,7 @@ from symgen.description.yaml import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of, measured_name, remove, robot_file
+from symgen.studio.folder import DRAFT, LOOPS, json_of, measured_name, remove, robot_file
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -274,16 +274,32 @@ class Pages:
             if kind != "robot":
                 await self._readable(part)
                 self.folder.take_measured(kind, name, part)
-            elif "error" in (shown := await self.server.view(views.robot, str(part), "")):
-                raise InputError(f"{name[:80]}: {shown['error']}")
             else:
-                self.folder.take_robot(name, content_of(part))
+                await self._take_robot(name, part)
         finally:
             remove(folder)
         if kind == "validation":  # the page stays
             self.server.changed()
             return PlainTextResponse(self.folder.measured(kind))
         return await self._changed("")
+
+    async def _take_robot(self, name: str, part: Path) -> None:
+        """A robot, or the loops of the robot that is there, beside a copy of its own file."""
+        robot, loops = part, part.name == LOOPS
+        if loops:
+            if (own := self.folder.first(TREES)) is None:
+                raise InputError(
+                    f"{name[:80]}: loops belong to a URDF or MJCF file; drop that first"
+                )
+            robot = part.with_name(own.name)
+            robot.write_bytes(own.read_bytes())
+        shown = await self.server.view(views.robot, str(robot), "")
+        if "error" in shown:
+            raise InputError(f"{name[:80]}: {shown['error']}")
+        if loops:
+            self.folder.take_loops(content_of(part), shown["text"])
+        else:
+            self.folder.take_robot(name, content_of(part))
 
     async def _readable(self, part: Path) -> None:
         """Refuse a file that is no table, before it replaces one; which topic of a bag counts is asked later."""

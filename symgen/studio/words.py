@@ -12,6 +12,7 @@ PLACES = {
     "identify says why": "Solve says why",
     "symgen report, or symgen identify --physical": "physical consistency on Solve",
     "ask with symgen report --encoder STEP, or symgen cestac --advise": "ask for it on Solve",
+    "--columns ZZ1R,MX2R of symgen report and cestac, or cestac: {columns: [ZZ1R, MX2R]} of the study": "cestac.columns of the study",
     "symgen report --encoder STEP (with --side motor for an encoder on the motor)": "CESTAC on Solve",
     "symgen cestac --rounding phase --delta STEP": "CESTAC on Solve, with this step",
     "symgen cestac without --advise": "CESTAC on Solve",

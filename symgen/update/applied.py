@@ -17,9 +17,11 @@ NOTHING = 1e-12  # SI; smaller numbers are rounding
 SOURCES = {"record": "record", "sum": "sums", "file": "physics"}
 LEGEND = {
     "record": "record: the record determines the number; sigma is its standard deviation",
-    "sum": "sums: the record determines only sums with other numbers; this number is the one nearest to the file, so it has no sigma",
+    "sum": "sums: the record determines only sums with other numbers; this number is the one nearest to the file, so it has no sigma. standard_parameters.csv of the results has other numbers: another robot with the same torques, which did not put motor inertia first",
     "file": "physics: no joint torque depends on the number; changed only to keep the link physical",
 }
+PRODUCTS = ("inertia xy", "inertia xz", "inertia yz")
+SIGN = "inertia xy is -sum m x y about the centre of mass, an entry of the inertia matrix as both formats have it; XY of symgen has the same sign, about the origin of its link frame"
 
 
 @dataclass(frozen=True)
@@ -145,11 +147,16 @@ class Applied:
 
         The parameters that the format cannot store follow, one a line.
         """
-        count = len(self.changes)
+        count, rest = len(self.changes), len(self.placeless)
         head = f"{self.file}: {count or 'no'} number{'s' * (count > 1)} change{'s' * (count < 2)}"
-        rest = ", with the values below," if self.placeless else ""
+        if rest:
+            head += (
+                f" in the file; {rest} more value{'s' * (rest > 1)} {'have' if rest > 1 else 'has'} no "
+                f"place in {self.format} and {'are' if rest > 1 else 'is'} not written"
+            )
+        whole = "Both together leave" if rest else "The new file leaves"
         explained = (
-            f"; the new file{rest} leaves {self.error:.1f} % of the torques of the record unexplained"
+            f". {whole} {self.error:.1f} % of the torques of the record unexplained"
             if isfinite(self.error)
             else ""
         )
@@ -162,7 +169,7 @@ class Applied:
             )
         if not self.placeless:
             return [*lines, f"Everything identified has a place in the {self.format}."]
-        lines.append(f"Without a place in the {self.format}, set these in your program:")
+        lines.append("Not written; set these in your program:")
         return lines + [f"  {line}" for line in self._rest()]
 
     def _rest(self) -> list[str]:
@@ -182,6 +189,8 @@ class Applied:
         """List further remarks for the user, for instance on numbers that no torque determines."""
         sources = {c.told_by for c in self.changes}
         notes = [text for told_by, text in LEGEND.items() if told_by in sources]
+        if any(c.number in PRODUCTS for c in self.changes):
+            notes.append(SIGN)
         notes += [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.spread:
             notes.append(

@@ -198,3 +198,41 @@ def test_one_call_finds_the_best_of_the_measured_arm(tmp_path):
         "no",
         "no",
     )  # without the counterbalance, a law lacks
+
+
+def test_studies_of_a_base_that_moves(tmp_path):
+    """--base as in identify: the file says fixed, the studies name the motion of the base."""
+    model = symgen.model("planar_2r", base="moving")
+    t = np.arange(0, 12, 1 / RATE)
+    w, lines = np.array([1.7, 1.1, 2.3]), []
+    for name, phase in (("a", 0.0), ("b", 2.0)):
+        angle = w * t[:, None] + phase + np.array([0, 1, 2])
+        heave = [np.sin(1.3 * t), np.cos(2.9 * t), 9.81 + np.sin(2.1 * t)]
+        base = np.hstack([0.5 * np.sin(angle), 0.5 * w * np.cos(angle), np.column_stack(heave)])
+        v = np.array([2.1, 3.7])
+        q, qd, qdd = (f(v * t[:, None] + phase) for f in (np.sin, np.cos, np.sin))
+        tau = model.inverse_dynamics(
+            base, q, v * qd, -(v**2) * qdd, model.base_parameters(model.VALUES)
+        )
+        tau = tau + np.random.default_rng(1).normal(0, 0.05, tau.shape)
+        head = "t,q1,q2,tau1,tau2," + ",".join(f"b{k}" for k in range(9))
+        np.savetxt(
+            tmp_path / f"{name}.csv",
+            np.column_stack([t, q, tau, base]),
+            delimiter=",",
+            header=head,
+            comments="",
+        )
+    own = {"base": {"motion": [f"b{k}" for k in range(9)]}}
+    for cutoff in (5, 15):
+        mapping = {
+            "record": {"files": ["a.csv"], **own},
+            "signals": {"lowpass": {"cutoff": cutoff}},
+            "validate": {"record": {"files": ["b.csv"], **own}},
+        }
+        (tmp_path / f"c{cutoff}.yaml").write_text(json.dumps(mapping))
+        lines.append(tmp_path / f"c{cutoff}.yaml")
+    result = run("planar_2r", *lines, "--base", "moving")
+    assert result.exit_code == 0, result.output
+    assert "c15" in result.stdout and "c5" in result.stdout
+    assert run("planar_2r", *lines).exit_code == 2

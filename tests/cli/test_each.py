@@ -9,7 +9,9 @@ from planar_data import record
 from typer.testing import CliRunner
 
 import runtime
+import runtime.each
 import symgen
+from symgen.cli import told
 from symgen.cli.main import app
 
 RUNS = 6
@@ -102,6 +104,52 @@ def test_records_of_one_name_have_their_folders(folder):
         "run2",
     ]
     assert len(list(folder.glob("results/day*/log/estimate.json"))) == 2
+
+
+def test_an_interrupted_command_is_continued(folder, monkeypatch):
+    """Ctrl-C while the third record is being written."""
+    write = runtime.each.write_all
+
+    def interrupted(place, files):
+        if place.name == "run2":
+            raise KeyboardInterrupt
+        return write(place, files)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runtime.each, "write_all", interrupted)
+        files = [f"run{k}.csv" for k in range(1, 4)]
+        arguments = ["planar_2r", "study.yaml", *files, "--each", "-o", "results"]
+        result = CliRunner().invoke(app, ["identify", *arguments, "--no-plausible"])
+    assert result.exit_code == 130 and result.stderr.strip() == (
+        "stopped; 2 of 4 records are finished, and their results are in results; the next one was "
+        "run2: repeat the command to continue"
+    )
+    before = written(folder)
+    assert list(before) == ["run0", "run1"]
+    lines, said, _ = each(4)
+    assert "4 records in results; 2 of them had their results already" in said
+    assert len(lines) == 4 and {name: written(folder)[name] for name in before} == before
+
+
+def test_programs_read_the_records_and_the_time_that_is_left(folder, monkeypatch):
+    """Records whose results are kept take no time, so the time of the others is not theirs."""
+    each(2)
+    monkeypatch.setenv("SYMGEN_LINES", "json")
+    clock = iter(range(100, 200, 7))
+    monkeypatch.setattr("symgen.cli.told.monotonic", lambda: next(clock) / 7)
+    _, said, _ = each(5)
+    lines = [line for line in map(json.loads, said.splitlines()) if "done" in line]
+    assert [line["done"] for line in lines] == [2, 3, 4, 5]
+    assert {line["total"] for line in lines} == {5} and lines[0]["left_s"] is None
+    assert lines[-1]["left_s"] == 0 and lines[1]["left_s"] > 0
+
+
+def test_the_time_that_is_left_is_that_of_the_steps_done_since_the_first_call(monkeypatch):
+    """100 of 110 steps are kept; then two take 3 s each, and 8 are left."""
+    clock = iter([50.0, 53.0, 56.0])
+    monkeypatch.setattr(told, "monotonic", lambda: next(clock))
+    left = told.time_left()
+    assert [left(100, 110), left(101, 110), left(102, 110)] == [None, 27.0, 24.0]
 
 
 @pytest.mark.campaign

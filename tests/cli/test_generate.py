@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from fnmatch import fnmatch
+from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
 
@@ -249,3 +250,18 @@ def test_command_in_the_header_names_no_folder(tmp_path):
     path.write_text(skeleton("arm"))
     text = emitted([str(path)])["arm.py"]
     assert "symgen generate arm.yaml" in text and str(tmp_path) not in text
+
+
+def test_c_without_values_says_so(tmp_path):
+    """A robot file without friction values has no X: the C file lacks the array, and says why."""
+    text = (files("symgen") / "description/robots/planar_2r.yaml").read_text(encoding="utf-8")
+    assert "FV2:" in text
+    (tmp_path / "arm.yaml").write_text(re.sub(r", FV2: [-+.\de]+|FV2: [-+.\de]+, ", "", text))
+    assert "FV2:" not in (tmp_path / "arm.yaml").read_text()
+    for source, missing in ((tmp_path / "arm.yaml", True), ("planar_2r", False)):
+        result = run(source, "--target", "c", "-o", tmp_path)
+        assert result.exit_code == 0, result.output
+        assert (
+            "no planar_2r_values, because the robot file has no value of FV2;" in result.stderr
+        ) == missing
+        assert ("planar_2r_values[" in (tmp_path / "planar_2r.c").read_text()) != missing

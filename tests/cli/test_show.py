@@ -5,6 +5,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from campaign import sampled, some
 from typer.testing import CliRunner
@@ -233,3 +234,42 @@ def test_the_packaged_robots_are_listed():
     assert result.exit_code == 0
     assert [line.split()[0] for line in lines] == list(packaged_robots())
     assert any(line.startswith("tx40 ") and "TX40" in line for line in lines)
+
+
+def test_signs_are_those_of_point_masses(tmp_path):
+    """Three point masses on a turning link: XY = -sum m x y, the sign of ixy of the URDF, whose
+    torques are those of pinocchio and of the masses themselves.
+    """
+    import pinocchio
+
+    m, r = (
+        np.array([1.0, 2.0, 3.0]),
+        np.array([[0.3, 0.2, 0.1], [0.1, 0.5, -0.2], [0.4, -0.1, 0.3]]),
+    )
+    c = m @ r / m.sum()
+    J = sum(a * (d @ d * np.eye(3) - np.outer(d, d)) for a, d in zip(m, r - c, strict=True))
+    tensor = " ".join(
+        f'i{a}{b}="{J["xyz".index(a), "xyz".index(b)]!r}"'
+        for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")
+    )
+    urdf = (
+        (
+            '<robot name="one"><link name="b"/><link name="l"><inertial><origin xyz="'
+            + " ".join(map(repr, map(float, c)))
+            + f'"/><mass value="{m.sum()!r}"/><inertia {tensor}/></inertial></link>'
+            '<joint name="j" type="revolute"><parent link="b"/><child link="l"/><axis xyz="0 0 1"/>'
+            '<limit lower="-3" upper="3" velocity="3" effort="9"/></joint></robot>'
+        )
+        .replace("np.float64(", "")
+        .replace(")", "")
+    )
+    (tmp_path / "one.urdf").write_text(urdf)
+    values = symgen.model(tmp_path / "one.urdf").VALUES
+    assert values["XY1"] == pytest.approx(-np.sum(m * r[:, 0] * r[:, 1]))
+    assert values["MX1"] == pytest.approx(np.sum(m * r[:, 0]))
+    ixy = -np.sum(m * (r - c)[:, 0] * (r - c)[:, 1])
+    assert f'ixy="{ixy:.6f}'[:12] in urdf and ixy * J[0, 1] > 0
+    body = pinocchio.buildModelFromUrdf(str(tmp_path / "one.urdf")).inertias[1]
+    assert body.toDynamicParameters()[5] == pytest.approx(values["XY1"])
+    (line,) = [x for x in run("tx40").stdout.splitlines() if x.startswith("signs:")]
+    assert "XY = -sum m x y" in line and "as ixy of a URDF" in run("tx40").stdout.replace("\n", " ")

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from runtime.ground.progress import Work
 from runtime.ground.table import aligned, interval, with_intervals
-from symgen.cli import session
+from symgen.cli import session, told
 
 TEXT = "With care. " + "The model leaves a part unexplained. " * 4 + "\nZZ1R 1.79 +- 0.02"
 
@@ -62,3 +63,30 @@ def test_cells_stand_below_each_other() -> None:
     )
     assert first.index("+-") == second.index("+-")
     assert first.index("kg") == second.index("N*m")
+
+
+def test_long_work_tells_the_time_left_where_no_terminal_shows_a_bar(monkeypatch, capsys) -> None:
+    """A line every ten seconds, none at the end; what is expected may change on the way."""
+    clock = iter([0.0, 4.0, 11.0, 12.0, 30.0, 31.0])
+    monkeypatch.setattr(told, "monotonic", lambda: next(clock))
+    count = told.lines_of("steps")
+    for done, total in ((1, 10), (2, 12), (3, 12), (10, 15), (15, 15)):
+        count(done, total)
+    assert capsys.readouterr().err.splitlines() == [
+        "  steps: 2 of 12, about 55 s left",
+        "  steps: 10 of 15, about 15 s left",
+    ]
+
+
+def test_work_counts_what_it_expects() -> None:
+    seen: list[tuple[int, int]] = []
+    work = Work(lambda done, total: seen.append((done, total)), later=10)
+    work.begin(4)
+    work.advance(3)
+    work.left = 5  # more than was guessed
+    work.advance()
+    work.end()
+    work.begin(6)
+    work.advance(6)
+    work.end()
+    assert seen == [(0, 10), (3, 10), (4, 14), (4, 10), (4, 10), (10, 10), (10, 10)]

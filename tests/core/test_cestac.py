@@ -14,7 +14,7 @@ from scipy.stats import t
 from runtime.compose import cestac, estimate_of, observe
 from runtime.core.cestac.cestac import key_blocks, levels_of
 from runtime.core.cestac.perturbed import perturbed_position, perturbed_torque
-from runtime.core.cestac.result import deciding_names, level_result, runs_needed
+from runtime.core.cestac.result import Cestac, deciding_names, level_result, runs_needed
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.drives import Drives
 from runtime.core.rows.observation import Observation
@@ -238,7 +238,7 @@ def test_named_columns_are_judged_in_the_essential_fit(names):
             X, X_whole = (r.reference.X[k] for r, k in zip((found, whole), places, strict=True))
             assert pytest.approx(X_whole, rel=1e-9) == X
     for level in found.levels:
-        assert {*level.decided_by} <= {*names, "rho"}
+        assert {*level.decided_by} <= {*names}
 
 
 def test_several_records_are_stacked():
@@ -308,27 +308,56 @@ def test_motor_side_divides_the_step_by_the_ratio():
         cestac(blind, RECORD, study(), map=several)
 
 
-def test_verdicts():
+@pytest.mark.parametrize(
+    ("e", "verdict", "chapter", "names"),
+    [
+        ((0.3, 0.2, 2.0), "unbiased", "doubtful", {"c"}),
+        ((3.0, 0.2, 2.0), "doubtful", "doubtful", {"a"}),
+        ((7.0, 6.0, 2.0), "biased", "biased", {"a", "b"}),
+        ((0.3, 0.2, 4.0), "doubtful", "doubtful", {"c"}),
+        ((0.3, 0.2, 11.0), "doubtful", "biased", {"c"}),
+        ((0.3, 0.2, 13.0), "biased", "biased", {"c"}),
+    ],
+)
+def test_a_change_is_compared_with_the_interval(e, verdict, chapter, names):
+    """c has an interval of +-25 %, by slow residuals: 2.5 % are negligible, 12.5 % biased; those of
+    a and b are below 10 %, and 1 % and 5 % remain. The chapter's limits stand beside.
+    """
+    reference = estimate_like(relative_sigma=(1.0, 2.0, 4.0), corrected=(1.0, 2.0, 25 / 1.96))
+    X = reference.X * (1 - np.array(e) / 100)
+    runs = Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3)
+    result = level_result(Level(1e-3), runs, Measured, reference)
+    assert (result.verdict, result.chapter_verdict) == (verdict, chapter)
+    assert set(result.decided_by) == names
+    assert all(result.decided_by[name] == pytest.approx(e["abc".index(name)]) for name in names)
+    study = Cestac(reference.names, reference, (result,))
+    last = {
+        "unbiased": "less than a tenth of its 95 % interval of +-25 %: the record, not the encoder",
+        "doubtful": "less than half of its 95 % interval of +-25 %.",
+        "biased": "more than half of its 95 % interval of +-25 %.",
+    }
+    if "c" in names or verdict != chapter:
+        (sentence,) = study.reasons
+        assert f"c changes by {e[2]:.1f} %" in sentence and last[verdict] in sentence
+    else:
+        assert not study.reasons
+    assert verdict in study.message and "+- 95 %, %" in study.brief()
+    rows = {row[0]: row[1] for row in study.residual_table().rows}
+    assert rows["verdict of the chapter, (21): 1 % and 5 %"] == chapter
+
+
+def test_an_uncertain_parameter_is_judged_by_its_interval():
+    """A %sigma of 30 % was without effect on the verdict, whatever the encoder did to it."""
     reference = estimate_like(relative_sigma=(1.0, 2.0, 30.0))
-    for e, verdict, names in (
-        ((0.3, 0.2, 60.0), "unbiased", {"a"}),
-        ((3.0, 0.2, 60.0), "doubtful", {"a"}),
-        ((7.0, 6.0, 60.0), "biased", {"a", "b"}),
-    ):
-        X = reference.X * (1 - np.array(e) / 100)
-        result = level_result(
-            Level(1e-3),
-            Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3),
-            Measured,
-            reference,
-        )
-        assert result.verdict == verdict
-        assert set(result.decided_by) - {"rho"} == names
-        assert (
-            "Without effect on this verdict" in result.message
-            and "c" in result.message.rsplit(":", 1)[1]
-        )
-    assert deciding_names(reference) == ("a", "b")
+    assert deciding_names(reference) == ("a", "b", "c")
+    for change, verdict in ((5.0, "unbiased"), (20.0, "doubtful"), (60.0, "biased")):
+        X = reference.X * (1 - np.array([0.1, 0.1, change]) / 100)
+        runs = Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3)
+        result = level_result(Level(1e-3), runs, Measured, reference)
+        assert (result.verdict, result.chapter_verdict) == (verdict, "unbiased")  # not a main one
+    nothing = estimate_like(relative_sigma=(70.0, 80.0, 90.0))
+    study = Cestac(nothing.names, nothing, (level_result(Level(1e-3), runs, Measured, nothing),))
+    assert "contain zero" in study.reasons[0]
 
 
 def test_runs_without_an_estimate_are_left_out_and_counted():
@@ -350,8 +379,8 @@ class Measured:
     Y = np.ones(4)
 
 
-def estimate_like(relative_sigma):
-    """An Estimate of parameters a, b, c with the given %sigma."""
+def estimate_like(relative_sigma, corrected=None):
+    """An Estimate of parameters a, b, c with the given %sigma, and that of slow residuals."""
     instants = np.arange(4.0)
     full = estimate_of(
         Observation(
@@ -359,7 +388,8 @@ def estimate_like(relative_sigma):
         )
     )
     X = np.array([1.0, 2.0, 3.0])
-    return replace(full, X=X, sigma=np.array(relative_sigma) * X / 100, residual_norm=2.0)
+    sigma, slow = (np.array(x) * X / 100 for x in (relative_sigma, corrected or relative_sigma))
+    return replace(full, X=X, sigma=sigma, sigma_corrected=slow, residual_norm=2.0)
 
 
 def test_runs_needed():

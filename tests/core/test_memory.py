@@ -7,7 +7,7 @@ import planar_2r_model as planar
 import pytest
 from planar_data import TRUE, motion
 
-from runtime import Record, estimate
+from runtime import Record, estimate, plausibility
 from runtime.ground import memory
 from runtime.ground.errors import InputError
 from runtime.ground.limits import LIMIT
@@ -47,6 +47,18 @@ def test_rows_that_do_not_fit_are_refused(record: Record, monkeypatch: pytest.Mo
         estimate(planar, record, EVERY)
     estimate(planar, record)  # decimated, as the message says
     estimate(planar, record, PIECE)
+
+
+def test_a_question_that_needs_more_memory_is_open(
+    record: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The check of record and study makes a second W, and says so where it has no room."""
+    W = 8 * estimate(planar, record, EVERY).rows * len(TRUE)
+    asked_for(monkeypatch, 2 * W - 1)
+    checks = plausibility(planar, record, EVERY).checks()
+    (excited,) = [c for c in checks if c.question == "Does the motion excite every parameter?"]
+    assert excited.state == "open" and excited.finding.startswith("Not judged: ")
+    assert " GB of memory, and " in excited.finding
 
 
 def test_small_work_is_not_told(record: Record, caplog: pytest.LogCaptureFixture) -> None:

@@ -2,7 +2,10 @@
 arm.
 """
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from campaign import campaign
@@ -16,6 +19,7 @@ from runtime.core.signals.filters import filtered_states
 from runtime.core.signals.reader import LOWPASS
 from runtime.counts.reader import COUNTS
 from runtime.ground.limits import limits
+from runtime.ground.progress import Work
 from runtime.reporting.sections import part_section
 from runtime.study import CestacSettings, Rows, Study
 
@@ -27,6 +31,12 @@ STUDY = Study(
     rows=Rows(trim=20),
     cestac=CestacSettings(columns=NAMES, runs=3, rounding="phase", delta=(STEP,)),
 )
+
+
+def certain(*names: str) -> Any:
+    """An estimate without uncertainty, of which the first parameter is judged."""
+    zero, judged = np.zeros(len(names)), {"judged": names[:1]}
+    return SimpleNamespace(names=names, relative_deviation=zero, provenance=judged)
 
 
 PART = replace(RECORD, t=RECORD.t[:2500], q=RECORD.q[:2500], tau=RECORD.tau[:2500])
@@ -67,7 +77,7 @@ def test_steps_by_both_readers():
     for limit in positions.encoders[0].limits:
         assert (
             limit.sampled is not None
-            and abs(limit.error / limit.percent - 1) < 0.4 + limit.half_width / limit.percent
+            and abs(limit.error / limit.change - 1) < 0.4 + limit.half_width / limit.change
         )
     assert (
         advice.real[0].encoders[0].limits[0].delta
@@ -86,20 +96,18 @@ def test_side_by_side_in_words():
     )
     text = str(advice)
     assert (
-        "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
+        "real, positions" in text and "real, counts" in text and "quadrature over the phase" in text
     )
-    assert "Real encoders read as counts: With every encoder alike" in advice.verdict
-    assert set(part_section(advice).tables[0].header) >= {
-        "encoder",
-        "positions, 5 %",
-        "counts, 1 %",
-    }
+    assert "Real, counts: with all encoders alike, least squares is practically" in advice.verdict
+    answer, detail, _ = part_section(advice).tables
+    assert [*answer.header] == ["encoder", "real, positions", "real, counts"]
+    assert {"positions, biased", "counts, unbiased"} <= {*detail.header}
     assert '"real"' in advice.to_json()
     delta = advice.encoders[0].delta
     assert np.allclose(delta[1:] / delta[:-1], LIMIT.READER_RATIO)  # nothing locks
-    name, e = advice.worst(0)
+    name, e, _ = advice.worst(0)
     assert (
-        f"read as positions: largest predicted change {e:.2f} % ({name})" in text
+        re.search(rf"read as positions: predicted \w+, {name} changes by {e:.2f} %", text)
         and "10, read as counts: not judged on this record" in text
     )
 
@@ -110,11 +118,9 @@ def test_no_step_is_advised_where_no_parameter_is_determined():
     advice = advise(
         planar, loud, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,)
     )
-    assert not advice.deciding and not advice.negative
-    assert (
-        "read as counts: no parameter has a %sigma of at most 10 %" in advice.verdict
-        and "no step makes" not in advice.verdict
-    )
+    assert not advice.negative
+    assert advice.verdict.startswith("The 95 % intervals of all parameters asked for contain zero")
+    assert "no step changes" not in advice.verdict
     assert "not judged on this record" in str(advice) and not part_section(advice).images
 
 
@@ -139,7 +145,7 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
     monkeypatch.setattr(LIMIT, "READER_UP", 2)
-    delta, _ = curves(real, {"1": (0,)}, 1.7e-3, [0])["1"]
+    delta, _ = curves(real, {"1": (0,)}, 1.7e-3, certain(*NAMES), Work())["1"]
     ratio = delta[1:] / delta[:-1]
     near = (delta[1:] > 1.9e-3) & (delta[:-1] < 2.1e-3)
     assert near.sum() >= 3 and ratio[near].max() < 1.05
@@ -166,7 +172,7 @@ class Scattered:
 
 
 def test_more_phases_at_the_steps_beside_a_limit():
-    delta, change = curves(Scattered(), {"all": (0, 1)}, 1.0, [0])["all"]
+    delta, change = curves(Scattered(), {"all": (0, 1)}, 1.0, certain("X1"), Work())["all"]
     e, deviation = np.abs(change[:, 0, 0]), dict(zip(delta, change[:, 1, 0], strict=True))
     assert np.allclose([deviation[1.5], deviation[2.25]], 1.6 / np.sqrt(3))  # 4 nodes
     assert deviation[delta[delta < 1].max()] < 0.3  # 32 of them, which is where 1 % is

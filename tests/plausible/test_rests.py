@@ -120,6 +120,21 @@ def test_only_rests_and_what_they_reach_are_left_out(pendulum) -> None:
     assert 0.3 < gone.mean() < 0.7
 
 
+def test_a_model_without_dry_friction_keeps_all_rows(pendulum) -> None:
+    """The same record without dry friction in motion: at rest, only sign(qd) would be noise."""
+    smooth = symgen.model(
+        symgen.parse_robot(
+            PENDULUM.replace("  FS: {kind: coulomb, along: all}\n", "").encode(), file="smooth.yaml"
+        )
+    )
+    record = both_ways(1)
+    assert runtime.observe(pendulum, record).dropped["low_speed"][0] > 0
+    speed = np.gradient(record.q, record.t, axis=0)
+    dry = TRUE["FS1"] * np.sign(speed) * (np.abs(speed) > 0.02)
+    rows = runtime.observe(smooth, replace(record, tau=record.tau - dry))
+    assert rows.dropped["low_speed"] == (0,) and rows.settings["rows"]["low_speed"] == 0
+
+
 def test_a_joint_at_rest_with_the_torque_of_the_model_keeps_its_rows(pendulum) -> None:
     """Friction of the model at rest: sign(qd) of the noise is the only difference, and FS is small."""
     rng = np.random.default_rng(5)

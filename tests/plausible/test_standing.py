@@ -72,6 +72,15 @@ def test_standing_joints_are_the_first_doubt(arm, moving) -> None:
     assert f" {unknown} smaller than their intervals: --verbose" in result.brief()
 
 
+def test_standing_joints_are_the_next_step_where_they_leave_the_rank_too_small(arm) -> None:
+    q, qd, qdd = motion([0, 1])
+    tau = arm.inverse_dynamics(q, qd, qdd, np.linspace(0.5, 1.5, len(arm.BASE_PARAMETERS)))
+    noise = np.random.default_rng(3).standard_normal(tau.shape)
+    result = runtime.identify(arm, runtime.Record(T, q, tau + 0.02 * noise), plausible=True)
+    assert result.checklist.doubt.startswith("Does the record determine the parameters? No: rank ")
+    assert "convert ROBOT held.yaml --lock q3=0.2 --lock q4=0.2" in result.checklist.next
+
+
 def test_a_joint_without_a_motor_is_judged_by_the_others() -> None:
     """A cart with a pendulum, in pinocchio's convention of the case: torque of the hinge zero by construction."""
     arm = symgen.model("planar_2r")

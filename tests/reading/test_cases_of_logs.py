@@ -54,10 +54,10 @@ def test_logs_of_learning_are_read(case: str) -> None:
 def test_stamps_rounded_and_in_nanoseconds(file: str, tmp_path: Path) -> None:
     """Rounded to 10 ms at 200 Hz: counted, never interpolated; nanoseconds by their size."""
     study = tmp_path / "study.yaml"
-    code, text, said = identified(
+    code, text, _ = identified(
         CASES / "stamps" / "two.urdf", CASES / "stamps" / file, "--suggest", study
     )
-    assert code == 0 and "study.yaml written" in said
+    assert code == 0 and "study.yaml is written" in text
     assert value(text, "ZZ1R") == pytest.approx(0.1887, abs=1e-3)
     assert value(text, "ZZ2") == pytest.approx(0.0180, abs=5e-4)
     record = load_study(study).record[0]
@@ -71,15 +71,15 @@ def test_stamps_rounded_and_in_nanoseconds(file: str, tmp_path: Path) -> None:
 def test_units_in_names_and_per_joint(tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
     case = CASES / "apply_rotors"
-    code, _, said = identified(case / "lab6.urdf", case / "run.csv.gz", "--suggest", study)
-    assert code == 0 and "study.yaml written; check" in said
+    code, text, _ = identified(case / "lab6.urdf", case / "run.csv.gz", "--suggest", study)
+    assert code == 0 and "study.yaml is written" in text and "Check this file" in text
     written, right = load_study(study).record[0], load_study(case / "log.yaml").record[0]
     assert written.columns == right.columns
     assert (written.units.t, written.units.q) == (right.units.t, right.units.q)
 
 
 def test_what_is_not_recognised_is_told(tmp_path: Path) -> None:
-    """Three of six positions: named by their joints, marked in the file, exit code 1."""
+    """Three of six positions: named by their joints, marked in the file; no error."""
     table = read_table(CASES / "apply_rotors" / "run.csv.gz")
     names = [re.sub("(roll|pitch)_pos_rad", r"\1_x", name) for name in table.names]
     lines = [",".join(names)]
@@ -87,9 +87,9 @@ def test_what_is_not_recognised_is_told(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("\n".join(lines).replace("nan", "RUN"))
     study = tmp_path / "study.yaml"
     robot = CASES / "apply_rotors" / "lab6.urdf"
-    code, _, said = identified(robot, tmp_path / "run.csv", "--suggest", study)
-    assert code == 1
-    assert "study.yaml written; not recognised: positions of joints 4 to 6\n" in said
+    code, text, said = identified(robot, tmp_path / "run.csv", "--suggest", study)
+    assert code == 0 and "error" not in text + said
+    assert "\n- positions of joints 4 to 6\n" in text and f"{robot} {study}" in text
     assert "# ? record.columns.q: positions of joints 4 to 6" in study.read_text()
     code, _, said = identified(robot, tmp_path / "run.csv")
     assert code == 2 and "identify --suggest FILE" in said
@@ -98,16 +98,16 @@ def test_what_is_not_recognised_is_told(tmp_path: Path) -> None:
 def test_hdf5_without_a_time_asks_for_the_rate(tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
     case = CASES / "hdf5"
-    code, _, said = identified(case / "two.urdf", case / "episode_0.hdf5", "--suggest", study)
-    assert code == 1 and "not recognised: time, or the sampling rate in record.rate" in said
+    code, text, _ = identified(case / "two.urdf", case / "episode_0.hdf5", "--suggest", study)
+    assert code == 0 and "- time, or the sampling rate in record.rate" in text
     assert "q: [observations.qpos]" in study.read_text()
 
 
 def test_degrees_are_asked_for(tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
     case = CASES / "lerobot"
-    code, _, said = identified(case / "two.urdf", case / "file-000.parquet", "--suggest", study)
-    assert code == 1 and "not recognised: unit of the positions, which reach 102" in said
+    code, text, _ = identified(case / "two.urdf", case / "file-000.parquet", "--suggest", study)
+    assert code == 0 and "- unit of the positions, which reach 102" in text
     study.write_text(study.read_text().replace("q: rad", "q: deg"))
     code, text, _ = identified(case / "two.urdf", study)
     assert code == 0 and value(text, "MX1R") == pytest.approx(0.540, abs=2e-3)
@@ -227,8 +227,8 @@ def test_milliseconds_of_a_record_that_is_read_as_it_is(tmp_path: Path) -> None:
     rows = np.column_stack([5.0 * np.arange(len(q)), q, tau])
     path, study = tmp_path / "log.csv", tmp_path / "study.yaml"
     np.savetxt(path, rows, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
-    code, text, said = identified(CASES / "hdf5" / "two.urdf", path, "--suggest", study)
-    assert code == 0 and "the time steps of 5 s are too long for seconds" in said
+    code, text, _ = identified(CASES / "hdf5" / "two.urdf", path, "--suggest", study)
+    assert code == 0 and "- record: units: {t: ms}, because time steps of 5 s are too long" in text
     assert load_study(study).record[0].units.t == "ms"
     assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
 
@@ -255,3 +255,21 @@ def test_episodes_are_records(tmp_path: Path) -> None:
     assert resample is not None
     assert (resample.method, resample.gaps, resample.rate) == ("count", "split", 200)
     assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
+
+
+def test_objects_of_motors_in_a_list(tmp_path) -> None:
+    """A log of one object per motor: its values are arrays, as if there were a list of each."""
+    path, q = tmp_path / "log.jsonl", np.random.default_rng(0).normal(size=(4, 3))
+    lines = [
+        {"stamp": k, "motors": [{"q": float(x), "state": {"tau": -float(x)}} for x in row]}
+        for k, row in enumerate(q)
+    ]
+    path.write_text("\n".join(map(json.dumps, lines)))
+    table = read_table(path)
+    assert table.names == ("stamp", "motors.q", "motors.state.tau")
+    np.testing.assert_array_equal(table.columns["motors.q"], q)
+    np.testing.assert_array_equal(table.columns["motors.state.tau"], -q)
+    lines[2]["motors"][1] = {"state": {"tau": 0.0}}
+    path.write_text("\n".join(map(json.dumps, lines)))
+    with pytest.raises(InputError, match=r"column 'motors\.q', line 3"):
+        read_table(path).read(["motors.q"])

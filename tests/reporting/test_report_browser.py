@@ -220,7 +220,7 @@ def test_a_study_of_encoders_answers_first(browser, folder):
     browser.open(folder / "cestac" / "report.html")
     verdict = browser.run("document.querySelector('.verdict').textContent.split(/\\s{2,}|\\n/)")
     said = [text for text in verdict if text.strip()]
-    assert said[0] == "Which resolution is enough?"
+    assert said[0] == "Which of the encoder steps tried is enough?"
     assert "None of the steps tried" in said[1]
 
 

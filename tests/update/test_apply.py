@@ -97,6 +97,13 @@ def test_other_values_change_numbers_alone_and_torques_are_theirs(file, tmp_path
     path, model, chi = file
     estimate = exact(model, chi)
     applied = symgen.apply(estimate, path)
+    first = str(applied).replace("\n  ", " ").split("Far from")[0]
+    assert (
+        f"{len(applied.changes)} numbers change in the file; {len(applied.placeless)} more" in first
+    )
+    assert "not written" in first and "inertia xy is -sum m x y" in str(applied).replace(
+        "\n  ", " "
+    )
     assert (
         skeleton(applied.content, without=True)
         == skeleton(path.read_bytes(), without=True)
@@ -511,8 +518,8 @@ def test_the_answer_comes_first_and_fits_the_terminal(tmp_path) -> None:
     applied = symgen.apply(replace(exact(model, chi), relative_error=1.26), path)
     lines = str(applied).split("\n")
     assert max(map(len, lines)) <= 80
-    assert "leaves 1.3 % of the torques" in " ".join(" ".join(lines[:2]).split())
-    assert "Without a place in the URDF, set these in your program:" in lines
+    assert "Both together leave 1.3 % of the torques" in " ".join(" ".join(lines[:2]).split())
+    assert "Not written; set these in your program:" in lines
     for name in applied.placeless:
         assert sum(line.startswith(f"  {name} = ") for line in lines) == 1
     assert lines.count("link 'fore'") == 1 and lines.count("joint 'elbow'") == 1

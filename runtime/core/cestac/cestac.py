@@ -35,6 +35,7 @@ from typing import Any
 import numpy as np
 
 from runtime.core.cestac.perturbed import (
+    PreparedRecord,
     Task,
     measured_rows,
     perturbed,
@@ -199,8 +200,21 @@ def cestac(
         notes=(
             *(() if loop is None else loop.notes),
             *(record.note for record in task.records if record.note),
+            *(_note_of_own(record) for record in task.records if record.own is not None),
         ),
         estimator=LEAST_SQUARES if linear else reference.method.upper(),
+    )
+
+
+def _note_of_own(record: PreparedRecord) -> str:
+    """Say with what runs of simulated encoders are compared, and how much they round."""
+    assert record.own is not None
+    own = float(record.own.step.max())
+    steps = f", with the effect of its own encoder steps of {own:.3g}" if own > 0 else ""
+    return (
+        f"Rounding phase simulates real encoders, whose error has the variance Delta^2/12, a twelfth "
+        "of that of two-point: for the same change, a step may be 3.5 times as coarse. Changes are "
+        f"against the estimate from {record.record.name}{steps}."
     )
 
 

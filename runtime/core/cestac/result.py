@@ -17,12 +17,21 @@ each form:
 As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative
 to ||Y|| has the printed order of magnitude.
 
-The verdict is "practically unbiased" if the %e (21) of all parameters asked for are below 1 %,
-"biased" if one of them is above 5 %, and "doubtful" between. Parameters whose own %sigma (11) is
-large do not decide; the result names the parameters that did. Section 4.1.4 of the chapter calls
-the residual (22) the best single indicator, because it covers the whole model: `residual_verdict`
-applies the same two limits to its increase. The residual hardly sees a parameter on which the
-torques depend little.
+By the chapter, the estimate is practically unbiased if the effect of the encoder is negligible
+against model errors and noise of the torques: %e (21) below 1 %; above 5 % it is biased. What model
+errors and noise do to a parameter is its 95 % interval +-h, in %, corrected for slow residuals. So a
+change counts in units of what is negligible for the parameter,
+
+    weighed = %e / max(1 %, h/10),
+
+and the verdict is "practically unbiased" if this number is below 1 for all parameters asked for,
+"biased" if it is above 5 for one of them, and "doubtful" between. A biased parameter changes by more
+than 5 % and by more than h/2, about its standard deviation. With normal errors, a bias of h/10
+leaves 94.5 % of the 95 % intervals right, a bias of h/2 83 %. `chapter_verdict` has the limits 1 %
+and 5 % alone, for all parameters asked for whose %sigma (11) is at most LIMIT.MAIN: the chapter
+excepts MX3, OFFSET4 and OFFSET6, which "do not contribute significantly". Its section 4.1.4 calls the residual (22) the best
+single indicator, because it covers the whole model: `residual_verdict` applies the same two limits
+to its increase. The residual hardly sees a parameter on which the torques depend little.
 """
 
 from __future__ import annotations
@@ -61,13 +70,17 @@ from runtime.ground.table import Table, csv_text, notebook, number, percentage
 Array = np.ndarray
 
 MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
-VERDICTS = "The verdict is that of the parameters asked for, eq. (21): the estimate is practically unbiased if all of them change by less than 1 %, and biased if one changes by more than 5 %. Beside it stands the rule of section 4.1.4 of the chapter, eq. (22): the same limits for the increase of the residual, which hardly sees a parameter on which the torques depend little."
+VERDICTS = "The verdict is that of the parameters asked for, eq. (21): the estimate is practically unbiased if each of them changes by less than 1 % or by less than a tenth of its 95 % interval, and biased if one changes by more than 5 % and by more than half of its interval. Beside it stand the limits of the chapter, 1 % and 5 % whatever the interval, and the rule of its section 4.1.4, eq. (22): the same limits for the increase of the residual, which hardly sees a parameter on which the torques depend little."
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
 JUDGED = "judged"
 """Key of the provenance of a reference: names that study.cestac.columns asks for."""
 LEAST_SQUARES = "LS"
+NOTHING_KNOWN = (
+    "The 95 % intervals of all parameters asked for contain zero, so this record cannot judge an "
+    "encoder: record a motion that excites the joints more"
+)
 Verdict = Literal["unbiased", "doubtful", "biased"]
 
 
@@ -91,6 +104,8 @@ class LevelResult:
         100 sigma / |mean|, eq. (20).
     e : ndarray, shape (b,), %
         100 |1 - mean / X_LS|, eq. (21).
+    weighed : ndarray, shape (b,)
+        e in units of what is negligible for the parameter: 1 %, or a tenth of its 95 % interval.
     half_width : ndarray, shape (b,), SI
         Half width of the Student interval of the mean.
     half_width_percent : ndarray, shape (b,), %
@@ -105,14 +120,15 @@ class LevelResult:
         The same increase with the W of each run.
     verdict : str
         unbiased, doubtful or biased.
+    chapter_verdict : str
+        Verdict by the limits 1 % and 5 % of e, whatever the intervals, for the main parameters.
     residual_verdict : str
         Verdict of `increase` alone.
     decided_by : mapping of float, %
-        Errors that decided the verdict, by name, largest first; where no parameter decides, that
-        of the residual, rho.
+        e of the parameters that decided the verdict, by name, the largest `weighed` first.
     runs_needed : int
-        Number of runs that makes the intervals of the deciding parameters narrower than 1 % of
-    X_LS.
+        Number of runs that makes the Student intervals of the deciding parameters narrower than
+        what is negligible for them.
     message : str
         The verdict in words.
     """
@@ -123,6 +139,7 @@ class LevelResult:
     sigma: Vector
     relative_sigma: Vector
     e: Vector
+    weighed: Vector
     half_width: Vector
     half_width_percent: Vector
     e_rho: float
@@ -130,6 +147,7 @@ class LevelResult:
     increase: float
     increase_own: float
     verdict: Verdict
+    chapter_verdict: Verdict
     residual_verdict: Verdict
     decided_by: Mapping[str, float]
     runs_needed: int
@@ -170,10 +188,9 @@ class Cestac(Result, Part):
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters that decide the verdict: those with a small %sigma, eq. (11).
+        """Names of the parameters that decide the verdict: those that study.cestac.columns names.
 
-        Their %sigma is at most LIMIT.DECIDING, and study.cestac.columns names them or is
-        "essential" or "all".
+        All of them if it is "essential" or "all".
         """
         return deciding_names(self.reference)
 
@@ -185,6 +202,15 @@ class Cestac(Result, Part):
             key=get_args(Verdict).index,
             default="unbiased",
         )
+
+    @property
+    def unit(self) -> str:
+        """Unit of the encoder steps: "rad", "m", or "rad or m" at joints of both kinds."""
+        units = {*self.reference.units.values()}
+        slides, turns = units & {"N*s/m", "kg"}, units & {"N*m*s/rad", "kg*m**2"}
+        if not slides or self.settings.get("cestac", {}).get("side") == "motor":
+            return "rad"
+        return "rad or m" if turns else "m"
 
     @property
     def encoder_steps(self) -> list[LevelResult]:
@@ -208,15 +234,39 @@ class Cestac(Result, Part):
             return "Nothing was perturbed."
         by_verdict: dict[str, list[str]] = {}
         for level in self.levels:
-            name, error = next(iter(level.decided_by.items()), ("rho", 0.0))
-            largest = f"{'the residual' if name == 'rho' else name} {error:.1f} %"
-            by_verdict.setdefault(level.verdict, []).append(f"{level.level.label} ({largest})")
+            name, error = next(iter(level.decided_by.items()))
+            by_verdict.setdefault(level.verdict, []).append(
+                f"{level.level.text(self.unit)} ({name} {error:.1f} %)"
+            )
         meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
         parts = [
             f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()
         ]
         method = "Least squares" if self.estimator == LEAST_SQUARES else self.estimator
         return f"{method} is {'; '.join(parts)}."
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Sentences on parameters whose interval decides the verdict at an encoder or torque step.
+
+        They are on the parameter that decides, and on the one that changes most in per cent if the
+        limits of the chapter, 1 % and 5 %, give a worse verdict.
+        """
+        half = 1.96 * self.reference.relative_deviation
+        worse, main = get_args(Verdict).index, main_columns(self.reference)
+        if not known_names(self.reference):
+            return (f"{NOTHING_KNOWN}.",)
+        told = []
+        for r in self.levels:
+            shown = [self.names.index(next(iter(r.decided_by)))]
+            if worse(r.chapter_verdict) > worse(r.verdict):
+                shown.append(max(main, key=lambda i: r.e[i]))
+            told += [
+                f"{r.level.text(self.unit)}: {_against(self.names[i], float(r.e[i]), float(half[i]))}."
+                for i in dict.fromkeys(shown)
+                if half[i] > 2 * LIMIT.BIASED
+            ]
+        return tuple(told)
 
     @property
     def lists_runs(self) -> bool:
@@ -226,18 +276,21 @@ class Cestac(Result, Part):
     def brief(self) -> str:
         """Return a short text: verdict at each rounding step, then a table of parameter errors."""
         errors = self.error_table()
-        return "\n".join([self.message, "", errors.caption, errors.to_text(), *self.notes])
+        head = [self.message, *self.reasons]
+        return "\n".join([*head, "", errors.caption, errors.to_text(), *self.notes])
 
     def to_table(self) -> str:
         """Return the full report as text: tables of means, residuals and errors, and verdicts."""
         means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
-        notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
+        notes = "\n".join(
+            [*(f"{r.level.text(self.unit)}: {r.message}" for r in self.levels), *self.notes]
+        )
         below = f"{errors.caption}\n{errors.to_text()}"
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
 
     def text(self) -> str:
         """Return the verdicts at every rounding step, after an explanation of both kinds."""
-        verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
+        verdicts = [f"{r.level.text(self.unit)}: {r.message}" for r in self.levels]
         return "\n".join([VERDICTS, *verdicts, *self.notes])
 
     def tables(self) -> list[Table]:
@@ -271,15 +324,16 @@ class Cestac(Result, Part):
         ]
         return Table(
             "Mean of the runs (18)",
-            ("parameter", self.estimator, *(r.level.label for r in self.levels)),
+            ("parameter", self.estimator, *(r.level.text(self.unit) for r in self.levels)),
             rows,
         )
 
     def error_table(self) -> Table:
         """Return the table of errors %e, eq. (21), and %sigma, eq. (20), at every rounding step.
 
-        It has one line per parameter; `*` marks parameters that do not decide the verdict, "-"
-        parameters whose 95 % interval contains zero.
+        It has one line per parameter, with half of its 95 % interval, corrected for slow residuals;
+        `*` marks parameters that do not decide the verdict, "-" parameters whose interval contains
+        zero.
         """
         reference = self.reference
         own = reference.relative_deviation
@@ -287,6 +341,7 @@ class Cestac(Result, Part):
             (
                 name if name in self.deciding else f"{name} *",
                 percentage(reference.relative_sigma[i], own[i]),
+                percentage(1.96 * own[i], own[i]),
                 *(
                     f"{percentage(r.e[i], own[i])} ({percentage(r.relative_sigma[i], own[i])})"
                     for r in self.levels
@@ -294,12 +349,9 @@ class Cestac(Result, Part):
             )
             for i, name in enumerate(self.names)
         ]
-        caption = "%e (21) and, in brackets, %sigma (20); * does not decide"
-        return Table(
-            caption,
-            ("parameter", f"%sigma of {self.estimator}", *(r.level.label for r in self.levels)),
-            rows,
-        )
+        caption = "Change %e (21) and, in brackets, %sigma (20); * does not decide"
+        header = ("parameter", f"%sigma of {self.estimator}", "+- 95 %, %")
+        return Table(caption, (*header, *(r.level.text(self.unit) for r in self.levels)), rows)
 
     def residual_table(self) -> Table:
         """Return the table of residual errors and verdicts, with one column per rounding step.
@@ -322,14 +374,20 @@ class Cestac(Result, Part):
                 "increase of the norm in % of |Y|, own W",
                 *(number(r.increase_own, ".2f") for r in levels),
             ),
-            ("verdict of the parameters, (21)", *(r.verdict for r in levels)),
+            ("verdict of the parameters, (21) and intervals", *(r.verdict for r in levels)),
+            (
+                f"verdict of the chapter, (21): {LIMIT.NEGLIGIBLE:g} % and {LIMIT.BIASED:g} %",
+                *(r.chapter_verdict for r in levels),
+            ),
             (
                 "verdict of the residual, (22): increase, measured W",
                 *(r.residual_verdict for r in levels),
             ),
-            ("runs for intervals within 1 %", *(str(r.runs_needed) for r in levels)),
+            ("runs for means within what is negligible", *(str(r.runs_needed) for r in levels)),
         ]
-        return Table("Residual and verdict", ("reading", *(r.level.label for r in levels)), rows)
+        return Table(
+            "Residual and verdict", ("reading", *(r.level.text(self.unit) for r in levels)), rows
+        )
 
     def _repr_html_(self) -> str:
         return notebook(
@@ -375,7 +433,6 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
     """
     levels = [level for level in result.levels if level.level.delta and not level.level.torque]
     levels.sort(key=lambda level: level.level.delta)
-    lengths = {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
     delta = np.array([level.level.delta for level in levels])
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
     largest = dict(zip(result.names, np.nan_to_num(e).max(axis=0), strict=True))
@@ -401,7 +458,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
             ax.annotate(f"{limit:g} %", (1.0, limit), xytext=(3, 0), va="center", **place)
         labels = [level.level.label.replace("2*pi/", "2π/") for level in levels]
         ax.set_xticks(delta, labels, rotation=30, ha="right", fontsize=8)
-        ax.set_xlabel(f"resolution Δ, {'m' if lengths else 'rad'}")
+        ax.set_xlabel(f"resolution Δ, {result.unit}")
         ax.set_ylabel("%e: change of the estimate, %")
 
     return Figure(
@@ -475,13 +532,44 @@ def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Find the parameters that decide the verdict: %sigma, eq. (11), is at most LIMIT.DECIDING."""
-    asked = reference.provenance.get(JUDGED, reference.names)
-    return tuple(
-        name
-        for name, relative in zip(reference.names, reference.relative_sigma, strict=True)
-        if relative <= LIMIT.DECIDING and name in asked
-    )
+    """Return the parameters that decide the verdict: those that study.cestac.columns asks for."""
+    return tuple(reference.provenance.get(JUDGED, reference.names))
+
+
+def known_names(reference: Estimate) -> tuple[str, ...]:
+    """Return the parameters that decide the verdict and whose 95 % interval does not contain zero."""
+    known = dict(zip(reference.names, 1.96 * reference.relative_deviation < 100, strict=True))
+    return tuple(name for name in deciding_names(reference) if known[name])
+
+
+def main_columns(reference: Estimate) -> list[int]:
+    """Find the numbers of the main parameters asked for: %sigma, eq. (11), is at most LIMIT.MAIN."""
+    asked = deciding_names(reference)
+    return [
+        i
+        for i, name in enumerate(reference.names)
+        if name in asked and reference.relative_sigma[i] <= LIMIT.MAIN
+    ]
+
+
+def negligible(reference: Estimate) -> Vector:
+    """Compute the change of each parameter that is negligible, shape (b,), % of |X_LS|.
+
+    It is 1 %, or a tenth of h if that is more, with +-h the 95 % interval, corrected for slow
+    residuals.
+    """
+    h = 1.96 * reference.relative_deviation
+    return np.asarray(np.fmax(LIMIT.NEGLIGIBLE, LIMIT.NEGLIGIBLE / LIMIT.BIASED * h / 2))
+
+
+def weighed_change(change: Array, reference: Estimate) -> Array:
+    """Divide changes of the parameters, shape (..., b), %, by what is negligible for each.
+
+    The limits of the result are those of the chapter: 1, and 5 for a bias. nan for a value of
+    exactly zero.
+    """
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(change) / negligible(reference))
 
 
 def level_result(
@@ -513,10 +601,11 @@ def level_result(
         relative_sigma = 100 * sigma / np.abs(mean)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
     decisive = [reference.names.index(name) for name in deciding_names(reference)]
-    errors = {reference.names[i]: float(e[i]) for i in decisive}
-    e_rho = _relative_change(rho, rho_ls)
-    verdict, decided_by = _verdict(errors or {"rho": e_rho})
-    needed = runs_needed(float(spread[decisive].max(initial=0.0)))
+    weighed = np.nan_to_num(weighed_change(e, reference), posinf=np.inf)
+    verdict, decided_by = _verdict({reference.names[i]: float(weighed[i]) for i in decisive})
+    main = max((float(e[i]) for i in main_columns(reference)), default=0.0)
+    uncertain = np.nan_to_num(weighed_change(spread, reference)[decisive]).max()
+    needed = runs_needed(float(uncertain))
     return LevelResult(
         level=level,
         runs=runs,
@@ -524,33 +613,27 @@ def level_result(
         sigma=sigma,
         relative_sigma=relative_sigma,
         e=e,
+        weighed=weighed,
         half_width=half * sigma,
         half_width_percent=half * spread,
-        e_rho=e_rho,
+        e_rho=_relative_change(rho, rho_ls),
         e_rho_own=_relative_change(own, rho_ls),
         increase=100 * (rho - rho_ls) / norm_Y,
         increase_own=100 * (own - rho_ls) / norm_Y,
         verdict=verdict,
-        residual_verdict=_verdict_of_error(100 * abs(rho - rho_ls) / norm_Y),
-        decided_by=decided_by,
+        chapter_verdict=verdict_of(main),
+        residual_verdict=verdict_of(100 * abs(rho - rho_ls) / norm_Y),
+        decided_by={name: float(e[reference.names.index(name)]) for name in decided_by},
         runs_needed=needed,
-        message=_message(
-            verdict,
-            decided_by,
-            reference,
-            decisive,
-            N,
-            float(half * spread[decisive].max(initial=0.0)),
-            needed,
-        )
+        message=_message(verdict, decided_by, e, reference, N, float(half * uncertain), needed)
         + (f" {failed} of {N + failed} runs found no estimate and are left out." if failed else ""),
     )
 
 
 def runs_needed(spread: float) -> int:
-    """Find how many runs give means with confidence intervals of +-1 % (LIMIT.NEGLIGIBLE).
+    """Find how many runs give means whose Student intervals are negligible.
 
-    spread : 100 sigma / |X_LS|.
+    spread : standard deviation of the runs, in units of what is negligible for the parameter.
     """
     return 2 + bisect_left(
         range(2, LIMIT.RUNS_ANSWERED),
@@ -562,59 +645,64 @@ def runs_needed(spread: float) -> int:
     )
 
 
-def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
-    """Return the verdict at one rounding step, and the errors that decided it, largest first.
+def _verdict(weighed: Mapping[str, float]) -> tuple[Verdict, tuple[str, ...]]:
+    """Return the verdict at one rounding step, and the parameters that decided it, largest first.
 
-    If all errors are negligible, only the largest is returned.
+    If all weighed changes are negligible, only the largest is named.
     """
-    ordered = sorted(errors.items(), key=lambda item: -item[1])
-    verdict = _verdict_of_error(ordered[0][1])
+    ordered = sorted(weighed.items(), key=lambda item: -item[1])
+    verdict = verdict_of(ordered[0][1])
     if verdict == "unbiased":
-        return verdict, dict(ordered[:1])
+        return verdict, (ordered[0][0],)
     limit = LIMIT.BIASED if verdict == "biased" else LIMIT.NEGLIGIBLE
-    return verdict, {name: value for name, value in ordered if value >= limit}
+    return verdict, tuple(name for name, value in ordered if value >= limit)
 
 
-def _verdict_of_error(error: float) -> Verdict:
-    """Return the verdict for an error, in %, of a parameter or of the residual norm."""
+def verdict_of(error: float) -> Verdict:
+    """Return the verdict for a weighed change, or an error, in %, of the residual norm."""
     return (
         "unbiased" if error < LIMIT.NEGLIGIBLE else "biased" if error > LIMIT.BIASED else "doubtful"
     )
 
 
+def _against(name: str, e: float, half: float) -> str:
+    """Compare a change with half of the 95 % interval of its parameter, both in %, in words."""
+    share, why = next(
+        (words, why)
+        for most, words, why in (
+            (0.1, "less than a tenth of", ": the record, not the encoder, limits it"),
+            (0.5, "less than half of", ""),
+            (1.0, "more than half of", ""),
+            (np.inf, "more than", ""),
+        )
+        if e < most * half
+    )
+    if half >= 100:
+        return f"{name} changes by {share} its 95 % interval, which contains zero{why}"
+    digits = 0 if half >= 10 else 1
+    return f"{name} changes by {e:.1f} %, {share} its 95 % interval of +-{half:.{digits}f} %{why}"
+
+
 def _message(
     verdict: str,
-    decided_by: Mapping[str, float],
+    decided_by: Sequence[str],
+    e: Array,
     reference: Estimate,
-    decisive: Sequence[int],
     N: int,
     half: float,
     needed: int,
 ) -> str:
-    named = ", ".join(f"{name} {value:.2f} %" for name, value in decided_by.items())
-    asked = reference.provenance.get(JUDGED, reference.names)
-    undecided = [
-        name for i, name in enumerate(reference.names) if i not in decisive and name in asked
-    ]
+    named = ", ".join(f"{name} {e[reference.names.index(name)]:.2f} %" for name in decided_by)
+    small, large = f"{LIMIT.NEGLIGIBLE:g} % or a tenth", f"{LIMIT.BIASED:g} % and half"
     text = {
-        "unbiased": (
-            "practically unbiased, all errors of the deciding parameters below "
-            f"{LIMIT.NEGLIGIBLE:g} % (largest: {named})."
-        ),
-        "doubtful": (
-            f"doubtful, errors between {LIMIT.NEGLIGIBLE:g} and {LIMIT.BIASED:g} %: {named}."
-        ),
-        "biased": f"biased, errors above {LIMIT.BIASED:g} %: {named}.",
+        "unbiased": f"practically unbiased, all changes below {small} of the interval (largest: {named}).",
+        "doubtful": f"doubtful, changes above {small} of the interval: {named}.",
+        "biased": f"biased, changes above {large} of the interval: {named}.",
     }[verdict]
-    if undecided:
-        text += (
-            f" Without effect on this verdict, because their %sigma exceeds {LIMIT.DECIDING:g} "
-            f"%: {', '.join(undecided)}."
-        )
     if half >= LIMIT.NEGLIGIBLE:
         text += (
-            f" After {N} runs, the means are uncertain by {half:.1f} %; about {needed} runs reduce "
-            f"this to {LIMIT.NEGLIGIBLE:g} %."
+            f" The means of {N} runs are uncertain by {half:.1f} times what is negligible; about "
+            f"{needed} runs make this negligible."
         )
     return text
 

@@ -108,13 +108,17 @@ class Level:
     @property
     def label(self) -> str:
         """Text for a pair of rounding steps: `2*pi/10000` (positions) or `Phi 0.01` (torques)."""
+        return self.text()
+
+    def text(self, unit: str = "") -> str:
+        """Write the pair of rounding steps; a position step that is no share of a turn has its unit."""
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta
             parts.append(
                 f"2*pi/{counts:.0f}"
                 if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts
-                else f"{self.delta:.4g}"
+                else f"{self.delta:.4g} {unit}".rstrip()
             )
         if self.torque:
             parts.append(f"Phi {self.torque:.4g}")

@@ -10,16 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
-import scipy
 
 from runtime.core.least_squares.block_covariance import corrected_deviations
 from runtime.core.least_squares.estimate import Estimate, JointFit, Status
 from runtime.core.least_squares.solution import Solution, solve
 from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.provenance import versions
 from runtime.core.rows.factor import Array, Factor
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
@@ -286,10 +285,6 @@ def describe(observation: Observation, model: GeneratedModel | None = None) -> d
 
     They are the provenance of a result.
     """
-    try:
-        own = version("symgen")
-    except PackageNotFoundError:
-        own = "not installed"
     robot: dict[str, Any] = (
         {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
     )
@@ -298,7 +293,7 @@ def describe(observation: Observation, model: GeneratedModel | None = None) -> d
     return {
         **robot,
         "files": dict(observation.files),
-        "versions": {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__},
+        "versions": versions(),
     }
 
 
