@@ -157,7 +157,7 @@ class ExpectedError(Part):
         """Error that parameters from other parts of the record may have on one part, %; nan if it
         is not computed.
         """
-        return unseen_error(self.result) if self.result.held_out_rows else float("nan")
+        return unseen_error(self.result)
 
     @cached_property
     def lacking(self) -> Lacking | None:
@@ -275,14 +275,11 @@ def unseen_error(result: Identification) -> float:
 
     The result is in % of the torques of the part. It combines the upper limit of tr(W V W'), with W
     the rows of the part and V the covariance from the other parts, and the error of the fit. The
-    result is inf if the other parts do not determine V.
+    result is inf if the other parts do not determine V, and nan if there are no parts.
     """
-    observation, problem = result.observation, result.problem
-    most = 0.0
-    for rest, part in result.held_out_rows:
-        system = weighted_system(
-            observation.where(rest), "joint", problem.settings.estimate.columns
-        )
+    most = float("nan")
+    for rest, part in result.held_out:
+        system = weighted_system(rest, "joint", result.problem.settings.estimate.columns)
         solution = system.solve()
         if solution.rank < len(system.names):
             return float("inf")
@@ -292,10 +289,9 @@ def unseen_error(result: Identification) -> float:
         )
         if not np.isfinite(V).all():
             return float("inf")
-        at = [observation.names.index(name) for name in system.names]
-        spread, nu = undetermined(observation.W[np.ix_(part, at)] @ K, V)
+        spread, nu = undetermined(part.columns(system.names).factor.R11 @ K, V)
         upper = spread * chi2.ppf(EXPECTED_INTERVAL[1], nu) / nu
-        most = max(most, 100 * float(np.sqrt(upper) / np.linalg.norm(observation.Y[part])))
+        most = float(np.fmax(most, 100 * np.sqrt(upper) / np.linalg.norm(part.Y)))
     return float(np.hypot(most, result.model_estimate.relative_error))
 
 

@@ -41,7 +41,8 @@ from runtime.core.model import (
 from runtime.core.residuals import block_correlation, correlation_time, residual_correlation
 from runtime.core.result import Identification
 from runtime.core.rows.regressor import in_time
-from runtime.core.signals.filters import decimated
+from runtime.core.signals.decimation import PIECE, decimated_parts
+from runtime.core.signals.filters import States
 from runtime.ground.check import Answer, Question
 from runtime.ground.limits import LIMIT
 
@@ -191,27 +192,45 @@ def friction_columns(model: GeneratedModel, names: Sequence[str]) -> Array:
     return np.array([elements.get(name, ("",))[0] in ("coulomb", "viscous") for name in names])
 
 
-def with_sign(result: Identification) -> tuple[Array, Array]:
-    """Compute |tau_j| sign(qd_j) and sign(qd_j) in the rows of the observation, shape (r,) each.
+def with_sign(result: Identification, step: int) -> tuple[Array, Array]:
+    """Compute |tau_j| sign(qd_j) and sign(qd_j) in every `step`-th row of each joint.
 
     Both are computed at the rate of the record and decimated like the torques, so that a reversal
     is rounded in the same way. tau_j is the torque of all parameters except those of friction.
     """
     model, fit = result.model, result.estimate
-    names = model.BASE_PARAMETERS
+    names, n = model.BASE_PARAMETERS, len(model.JOINTS)
     X = np.array([fit[name] if name in fit.names else 0.0 for name in names])
     X[friction_columns(model, names)] = 0.0
-    parts = []
+    parts: list[list[Array]] = [[] for _ in range(n)]
+    before = np.zeros(n, dtype=int)  # rows of each joint in the records before
     for record in result.prepared:
         selection = record.certain(model)
-        window = record.states[selection.samples]
-        states = (window.q, window.qd, window.qdd)
-        tau = cast(Any, model).inverse_dynamics(*states, X, **in_time(model, window))
-        signals = np.stack([np.abs(tau) * np.sign(window.qd), np.sign(window.qd)])
-        rows = decimated(np.moveaxis(signals, 1, -1), selection.factor, selection.signals.decimate)
-        parts.append([rows[:, j, selection.mask[j]] for j in range(len(model.JOINTS))])
-    joined = [part[j] for j in range(len(model.JOINTS)) for part in parts]
-    load, sign = np.concatenate(joined, axis=-1)
+        window, plan = record.states[selection.samples], selection.plan
+
+        def signals(t0: int, t1: int, window: States = window) -> Array:
+            own = window[t0:t1]
+            states = (own.q, own.qd, own.qdd)
+            tau = cast(Any, model).inverse_dynamics(*states, X, **in_time(model, own))
+            return np.vstack([(np.abs(tau) * np.sign(own.qd)).T, np.sign(own.qd).T])
+
+        used = [
+            np.flatnonzero(own)[-k % step :: step]
+            for own, k in zip(selection.mask, before, strict=True)
+        ]
+        before += selection.mask.sum(axis=1)
+        pieces = (
+            decimated_parts(signals, 2 * n, plan)
+            if plan is not None
+            else (
+                (slice(a, a + PIECE), signals(a, a + PIECE)) for a in range(0, len(window), PIECE)
+            )
+        )
+        for part, values in pieces:
+            for j, rows in enumerate(used):
+                own = rows[(rows >= part.start) & (rows < part.stop)] - part.start
+                parts[j].append(values[[j, n + j]][:, own])
+    load, sign = np.concatenate([own for of_joint in parts for own in of_joint], axis=-1)
     return load, sign
 
 
@@ -247,7 +266,7 @@ def lacking_of(result: Identification) -> Lacking | None:
     if not usable:
         return None
     weight = 1 / np.where(size > 0, size, np.inf)[joint]
-    loaded, sign = (x[chosen] for x in with_sign(result))
+    loaded, sign = with_sign(result, step)
     blocks = observation.blocks((observation.span[1] - observation.span[0]) / BLOCKS)[chosen]
     t = observation.t[chosen] - observation.t[chosen].mean()
     t = t / (np.ptp(t) or 1.0)

@@ -284,11 +284,10 @@ def held_out_validation(
 
     The record has five parts (HELD_OUT_PARTS in limits.toml).
     """
-    number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
-    for p in np.unique(number):
-        part = observation.where(number == p)
+    folds = []
+    for rest, part in observation.folds(LIMIT.HELD_OUT_PARTS):
         label = f"[{', '.join(map(instant, part.span))}] s"
-        rest, name = observation.where(number != p), f"all but {label}"
+        name = f"all but {label}"
         folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
     predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
     missing = tuple(text for fold in folds for text in fold.missing)

@@ -199,10 +199,12 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
     sums = np.zeros((2, longest))
     for rows in records:
         own = place[rows] - place[rows[0]]
-        grid = np.zeros((2, own[-1] + 1))
-        grid[:, own] = x[rows], np.ones(len(rows))
-        spectrum = np.abs(rfft(grid, length := next_fast_len(2 * grid.shape[1], real=True))) ** 2
-        sums[:, : grid.shape[1]] += irfft(spectrum, length)[:, : grid.shape[1]]
+        length = next_fast_len(2 * (own[-1] + 1), real=True)
+        for total, values in zip(sums, (x[rows], 1.0), strict=True):
+            grid = np.zeros(own[-1] + 1)
+            grid[own] = values
+            spectrum = rfft(grid, length)
+            total[: len(grid)] += irfft(np.square(np.abs(spectrum)), length)[: len(grid)]
     return sums[0], np.rint(sums[1])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -258,25 +258,20 @@ class Identification:
         """
         return self.set_errors.get(self.model_columns, float("nan"))
 
-    @cached_property
-    def held_out_rows(self) -> tuple[tuple[Any, Any], ...]:
-        """Parts of the records that fits of other parts predict: rows of the fit and of the part.
+    @property
+    def held_out(self) -> Iterator[tuple[Observation, Observation]]:
+        """Parts of the records that fits of other parts predict: rows of the fit, and of the part.
 
-        The result is a list of pairs of bool arrays of shape (r,), empty if separate records or no
-        data are predicted.
+        There are no parts if separate records are predicted, or no data are.
         """
         if not self.validation or self.by_records:
-            return ()
-        t, (first, *_) = self.observation.t, self.validation
-        if first.folds:
-            number = self.observation.equal_parts(first.folds)
-            return tuple((number != p, number == p) for p in np.unique(number))
-        windows = self.study.validate.split or halves(*self.observation.span)
-        inside = [
-            (t >= (-np.inf if a is None else a)) & (t <= (np.inf if b is None else b))
-            for a, b in windows
-        ]
-        return tuple((inside[0], part) for part in inside[1:])
+            return
+        if self.validation[0].folds:
+            yield from self.observation.folds(self.validation[0].folds)
+            return
+        first, *others = self.study.validate.split or halves(*self.observation.span)
+        for window in others:
+            yield self.observation.between(*first), self.observation.between(*window)
 
     @property
     def unseen_error(self) -> float:

@@ -50,7 +50,7 @@ from runtime.core.least_squares.linear import System, assemble, percent
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.wls import by_weights
 from runtime.core.model import GeneratedModel
-from runtime.core.rows.factor import Array, Factor, factor, triangularise
+from runtime.core.rows.factor import Array, Factor, triangularise
 from runtime.core.rows.observation import Observation
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
@@ -276,8 +276,8 @@ def held_out_weight(
     good, the larger is chosen. A weight is abandoned as soon as it cannot be the best, since no
     prediction error is below the error of least squares on the same fifth.
     """
-    number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
-    parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
+    folds = observation.columns(system.names).fold_factors(LIMIT.HELD_OUT_PARTS)
+    parts = [part.weighted(1 / np.array(system.scales)) for part in folds]
     others = [
         Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())
         for part in parts
@@ -409,17 +409,6 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
     missing = len(physical.links) * 10 - len(known_inertia(physical))
     some = f" ({missing} parameters of links have no value and stay free)" if missing else ""
     return f"Values of the robot file as prior, {options.prior}, weight {weight:g}{some}."
-
-
-def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the QR factor of [W Y] of a part of the record, weighted as the whole record.
-
-    The weights of the joints are those of the whole record.
-    """
-    chosen = part.columns(system.names)
-    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
-        1 / np.array(system.scales)
-    )
 
 
 def solve_feasible(

@@ -177,7 +177,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
             f"all measured torques of joint {zero} are zero; give the columns of these torques in "
             "record.columns.tau"
         )
-    columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
+    columns = np.linalg.norm(observation.factor.weighted(1 / s).R11, axis=0)
     if not columns.all():
         raise np.linalg.LinAlgError("a column of the observation matrix is zero")
     weights = Weights(

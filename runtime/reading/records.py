@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -113,11 +113,13 @@ def _pieces(
         )
     drives = None if model is None else drives_of(model)
     side = conversion(settings, drives, first, last, n)
-    samples = in_frames(_joint_side(settings, columns, signals, side, missing), places)
-    table = signals["q"].table
+    table = replace(signals["q"].table, columns={})
     command = side.command if "tau" in signals else ""
     notes = [signal.table.note for signal in signals.values() if signal.table.note]
-    del signals, tables, first, last, other
+    signals = {key: replace(x, table=replace(x.table, columns={})) for key, x in signals.items()}
+    del tables, first, last, other  # the columns of the files
+    samples = in_frames(_joint_side(settings, columns, signals, side, missing), places)
+    del signals
     law = None
     if settings.by_law:
         limits = dict(getattr(model, "LIMITS", {}))
@@ -295,16 +297,18 @@ def _require_shapes(
 def _joint_side(
     settings: RecordSettings,
     columns: Columns,
-    signals: Mapping[str, Signal],
+    signals: dict[str, Signal],
     side: Conversion,
     missing: bool,
 ) -> dict[str, Array]:
     """Convert the signals to the joint side of the gears and to SI units.
 
-    The result also has the entry `missing`, True for each missing position, if there are any.
+    The result also has the entry `missing`, True for each missing position, if there are any. Each
+    signal is removed from `signals` once it is converted, so that its memory is free.
     """
     samples: dict[str, Array] = {}
-    for key, signal in signals.items():
+    for key in tuple(signals):
+        signal = signals.pop(key)
         values = signal.values
         if key == "q" and missing and np.isnan(values).any():
             samples["missing"] = np.isnan(values)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from runtime.core.record import JOINT_CHANNELS, Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.core.rows.streamed import WHOLE, Source, StreamedMatrix
 from runtime.core.signals.base import base_motion
 from runtime.core.signals.decimation import decimate
 from runtime.core.signals.filters import States, median_filtered
@@ -38,6 +39,8 @@ Array = np.ndarray
 
 COPIES = 2
 """Copies of W while rows are made and factored; 1.8 were measured without decimation."""
+ROW = 150
+"""Bytes of a row of a long record, whose W is not kept: Y, t, record and motion, and their sorting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +105,20 @@ class Prepared:
         return certain(model, self.states, self.selection)
 
     def observation(
-        self, model: GeneratedModel, columns: Sequence[str] | None = None
+        self, model: GeneratedModel, columns: Sequence[str] | None = None, *, whole: bool = True
     ) -> Observation:
-        """Build the system Y = W X + rho of the selected rows."""
-        wanted = Columns(model, columns)
-        files = self.record.files
-        return observation_of(wanted, self.states, self.torque, self.selection, files=files)
+        """Build the system Y = W X + rho of the selected rows.
+
+        whole : whether W is made now, or piece by piece when its rows are asked for.
+        """
+        return observation_of(
+            Columns(model, columns),
+            self.states,
+            self.torque,
+            self.selection,
+            files=self.record.files,
+            whole=whole,
+        )
 
     def by(self, study: Study) -> Prepared:
         """Return the same record prepared with the settings of another study.
@@ -172,12 +183,13 @@ def observation_of(
     selection: Selection,
     *,
     files: Mapping[str, str] | None = None,
+    whole: bool = True,
 ) -> Observation:
     """Build the system Y = W X + rho of one record; `columns` computes the observation matrix W.
 
     If errors of the velocities are known, two more kinds of rows are left out: rows in which
     missing positions leave the state unknown ("missing"), and rows in which the direction of dry
-    friction is uncertain ("direction").
+    friction is uncertain ("direction"). whole : as for `Prepared.observation`.
     """
     model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
@@ -188,17 +200,23 @@ def observation_of(
             f"expected {(n, K)} and {n} joints"
         )
     window = states[selection.samples]
-    used = np.flatnonzero(selection.mask.any(axis=0))
-    inside = slice(used[0], used[-1] + 1)
-    store = columns.decimated(window, selection.plan, inside)
+    instants = np.flatnonzero(selection.mask.any(axis=0))
+    inside = slice(instants[0], instants[-1] + 1)
+    made = (columns.decimated if whole else columns.read)(window, selection.plan, inside)
     selection = certain(model, states, selection)
     if not selection.mask.any():
         left_out = nothing_left(selection.dropped, K)
         raise InputError(left_out, file=", ".join(files or ()) or None)
-    mask = selection.mask[:, inside].ravel()
-    rows = store.reshape(len(columns.names), len(mask))
+    used = selection.mask[:, inside]
+    mask = used.ravel()
+    if isinstance(made, np.ndarray):
+        rows = made.reshape(len(columns.names), len(mask))
+        W = (rows if mask.all() else np.compress(mask, rows, axis=1)).T
+    else:
+        source = Source(columns.entries, made, used)
+        W = cast("Array", StreamedMatrix((source,), np.arange(len(columns.names))))
     return Observation(
-        W=(rows if mask.all() else np.compress(mask, rows, axis=1)).T,
+        W=W,
         Y=torque[:, inside].ravel()[mask],
         rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
         names=columns.names,
@@ -243,19 +261,22 @@ def stacked(
 
     columns : names of the columns; default: all.
 
-    Raise InputError if there is no record, or if W is larger than the memory.
+    W of long records, of more than WHOLE bytes, is made piece by piece when its rows are asked for.
+
+    Raise InputError if there is no record, or if the rows are larger than the memory.
     """
     if not records:
         raise InputError("no record is given; expected at least one")
     b = len(model.BASE_PARAMETERS if columns is None else columns)
     rows = sum(int(record.selection.mask.sum()) for record in records)
+    whole = 8.0 * rows * b <= WHOLE
     require_memory(
-        8.0 * COPIES * rows * b,
+        8.0 * COPIES * rows * b if whole else float(ROW * rows),
         f"{rows:,} rows of {b} columns",
         "decimate (signals.decimate), use a piece of the record (rows.window), or a robot of fewer "
         "columns (symgen convert --lock)",
     )
-    return stack([record.observation(model, columns) for record in records])
+    return stack([record.observation(model, columns, whole=whole) for record in records])
 
 
 def with_torques(

@@ -149,12 +149,21 @@ def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
     )
 
 
+LONG = 100_000
+"""Samples from which signals are filtered one after another, without copies of all of them."""
+
+
 def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
     """Filter x, shape (N, n), along its first axis by a zero-phase Butterworth low-pass.
 
     Each of the two passes has a gain of -3 dB at the cut-off.
     """
-    return zero_phase(*butterworth(rate, low), x, axis=0)
+    if x.ndim == 1 or len(x) < LONG:
+        return zero_phase(*butterworth(rate, low), x, axis=0)
+    found = np.empty(x.shape[::-1]).T
+    for j, column in enumerate(x.T):  # so that the copies of the filter are those of one column
+        found[:, j] = zero_phase(*butterworth(rate, low), column, axis=0)
+    return found
 
 
 @lru_cache(maxsize=32)
