@@ -1,12 +1,13 @@
 """Processor time and memory of `symgen identify` against the rows of a record of six joints.
 
-    python benchmarks/records.py [--rows 10000 30000 100000 300000 1000000]
+    python benchmarks/records.py [--rows 10000 30000 100000 300000 1000000 3000000]
 
 The TX40 at 1 kHz, four sines per joint, torques with noise of 0.3 N m; from a NumPy file. Each
 command is one process, of which the system tells the processor time and the largest resident set.
 The kinds are: the least squares alone (ols without the check of plausibility), the command as it is
-by default, and both without decimation, up to EVERY rows. The exponents are those of what a record
-adds to the command with the fewest rows; the load of the machine is printed.
+by default, and both without decimation, up to EVERY rows. The size of report.html is that of the
+default. The exponents are those of what a record adds to the command with the fewest rows; the load
+of the machine is printed.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 import symgen
 
 RATE, NOISE = 1000.0, 0.3  # Hz, N m
-EVERY = 100_000
+EVERY = 300_000
 KINDS = {
     "ols alone": ({"estimate": {"method": "ols"}}, ["--no-plausible"]),
     "default": ({}, []),
@@ -78,7 +79,10 @@ def exponent(rows: list[int], values: np.ndarray) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--rows", type=int, nargs="+", default=[10_000, 30_000, 100_000, 300_000, 1_000_000]
+        "--rows",
+        type=int,
+        nargs="+",
+        default=[10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000],
     )
     asked = parser.parse_args().rows
     with TemporaryDirectory() as name:
@@ -96,6 +100,10 @@ def main() -> None:
                 study = folder / f"{N}.yaml"
                 study.write_text(json.dumps({"record": {"files": [f"{N}.npz"]}, **settings}))
                 found.append(cost(["identify", "tx40", str(study), *options]))
+                if kind == "default":
+                    cost(["identify", "tx40", str(study), "-o", str(folder / "report")])
+                    size = (folder / "report" / "report.html").stat().st_size
+                    print(f"{N} rows: report.html has {size / 1e6:.2f} MB")
             for what, unit, values in zip(
                 ("time", "memory"), ("s", "MB"), np.array(found).T, strict=True
             ):

@@ -5,8 +5,8 @@
 prints a table and writes repair_SET_SEEDS.json after each study; --more goes on from it. The robots,
 their torques (pinocchio), noise, encoders and motions are those of `benchmarks/truth_simulator.py`,
 which shares no code with symgen or runtime; the errors are planted here, in arrays and URDF text.
-Study k of a set has the seed BASE[seeds] + k. `first` is for tuning; `final` has other robots, and
-is run once, after the design stands.
+Study k of a set has the seed BASE[seeds] + k. `first` and `second` are for tuning; `final` and
+`third` have other robots, and are run after a design stands.
 
     right      nine classes: the seven of docs/reliability.md, load friction, cogging
     one, two   one error, or two of different kinds
@@ -15,7 +15,9 @@ A study is a CSV file and a study file, as a user has them. It is judged on a se
 recorded with the same errors and read by the mended study: error of the predicted torques. A changed
 study is *right* if it reads the positions, torques, clock, table and gravity of the truth;
 *equivalent* if a noise-free record fits it as well as the right study; *partly* right if each part of
-the reading is either that of the truth or as it was given; otherwise *false*, whatever it predicts. *Told*: beside friction that is not negative, free parameters leave more of a noise-free
+the reading is that of the truth, as it was given, or that of the truth with one of the two errors
+alone, of any joint: a factor that is left on a torque whose delay is mended; otherwise *false*,
+whatever it predicts. *Told*: beside friction that is not negative, free parameters leave more of a noise-free
 record, read by the wrong study, than a fifth of the noise (pinocchio's regressor).
 """
 
@@ -53,7 +55,7 @@ from runtime.study import load_study, located, study_from_mapping, study_text
 
 Array = np.ndarray
 Row = dict[str, Any]
-BASE = {"first": 10_000, "second": 40_000, "final": 90_000}
+BASE = {"first": 10_000, "second": 40_000, "final": 90_000, "third": 300_000}
 EVERY = 4
 """Samples of the simulation of which one is recorded: 250 Hz."""
 CLASSES = (
@@ -67,8 +69,7 @@ def robots_of(seeds: str) -> list[Robot]:
     names = {
         "first": ("planar", "scara", "anthropomorphic"),
         "second": ("elbow", "skewed", "rail", "anthropomorphic"),
-        "final": ("elbow", "cylindrical", "skewed", "rail", "polar", "snake", "hanging"),
-    }[seeds]
+    }.get(seeds, ("elbow", "cylindrical", "skewed", "rail", "polar", "snake", "hanging"))
     return [world.ROBOTS[name] for name in names]
 
 
@@ -235,9 +236,12 @@ def one(k: int, seed: int, seeds: str, which: str) -> Row:
     g = tilt(rng) if tilted else np.array([0.0, 0.0, -9.81])
     noisy, clean = recorded(robot, seed, kind, g, seed, share=share)
     other = recorded(robot, seed, "ordinary", g, seed + 500_000, share=0.0)[1]
-    planted = [noisy, clean, other]
+    planted, alone = [noisy, clean, other], []
     for error, j in errors:
         state = rng.bit_generator.state
+        for joint in range(robot.n):
+            rng.bit_generator.state = state
+            alone.append(error.plant(clean, joint, rng))
         for i, w in enumerate(planted):
             rng.bit_generator.state = state
             planted[i] = error.plant(w, j, rng)
@@ -252,10 +256,10 @@ def one(k: int, seed: int, seeds: str, which: str) -> Row:
             written(w, folder, name)
         (folder / "arm.urdf").write_text(planted[0].urdf.urdf(robot.nominal), encoding="utf-8")
         (folder / "truth.urdf").write_text(robot.urdf(robot.nominal), encoding="utf-8")
-        return row | judged(folder, clean, g, which)
+        return row | judged(folder, clean, alone, g)
 
 
-def judged(folder: Path, clean: World, g: Array, which: str) -> Row:
+def judged(folder: Path, clean: World, alone: list[World], g: Array) -> Row:
     """The study as given, repaired, and what the repair did."""
     file = folder / "arm.urdf"
     model, variants = symgen.model(file), symgen.variants(file)
@@ -287,7 +291,7 @@ def judged(folder: Path, clean: World, g: Array, which: str) -> Row:
     result = runtime.identify(model, records_of(new.record, model, new), new)
     row["error"] = true_error(result, model, new, folder, clean, g)
     row["state"] = result.checklist.answer
-    row["outcome"] = outcome(robot, model, new, folder, clean, g)
+    row["outcome"] = outcome(robot, model, new, folder, clean, alone, g)
     return row
 
 
@@ -316,8 +320,13 @@ def study_like(study: Any) -> Any:
     return replace(study, record=())
 
 
-def outcome(robot: Any, model: Any, study: Any, folder: Path, clean: World, g: Array) -> str:
-    """Whether a mended study is right, equivalent, or false."""
+def outcome(
+    robot: Any, model: Any, study: Any, folder: Path, clean: World, alone: list[World], g: Array
+) -> str:
+    """Whether a mended study is right, equivalent, partly right, or false.
+
+    alone : the truth with one of the errors, of any joint.
+    """
     right = symgen.load_robot(folder / "truth.urdf")
     record = reading(study, model, "clean.csv")
     wrong = symgen.load_robot(folder / "arm.urdf")
@@ -339,7 +348,8 @@ def outcome(robot: Any, model: Any, study: Any, folder: Path, clean: World, g: A
                 (own, clean.q, plain.q) if key == "q" else (record.tau[:N, j], clean.tau, plain.tau)
             )
             alike = []
-            for wanted in (true[k : k + N, j], given_[k : k + N, j]):
+            for part in (true, given_, *(getattr(w, key) for w in alone)):
+                wanted = part[k : k + N, j]
                 left = found_ - wanted
                 if key == "q" and turns_[j]:
                     left = left - np.round(left.mean() / (2 * pi)) * 2 * pi
@@ -347,7 +357,7 @@ def outcome(robot: Any, model: Any, study: Any, folder: Path, clean: World, g: A
                 if key == "q" and not turns_[j]:
                     size = np.ptp(wanted) / 2
                 alike.append(bool(np.sqrt((left**2).mean()) < tolerance * size))
-            parts.append((alike[0], alike[1]))
+            parts.append((alike[0], any(alike[1:])))
     for j in right.joints:
         for key in ("alpha", "d", "r0"):
             a, b, c = (

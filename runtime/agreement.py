@@ -1,16 +1,16 @@
 """Compare the parameters of several records of one robot, each record fitted alone.
 
-Each record k is fitted alone, as `identify` fits it, with the same b columns. This gives X_k with
-standard deviations s_k. X_k is compared with the mean of the other records, weighted by their
+Each record k is fitted alone, as `identify` fits it, with the same b columns. The fit gives X_k
+with standard deviations s_k. X_k is compared with the mean of the other records, weighted by their
 standard deviations,
 
     X_-k = s_-k^2 sum X_m/s_m^2,    s_-k^-2 = sum 1/s_m^2,    d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
 
-s_k is the corrected standard deviation. It is multiplied by the root of a factor c if residuals
-stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A parameter
-differs if |d| exceeds DIFFERS. This limit is a convention, not a statistical test
-(benchmarks/truth.md). Differences up to LIMIT.RELEVANT_DIFFERENCE of the value do not change the
-verdict.
+s_k is the corrected standard deviation. The deviation is multiplied by the root of a factor c if
+residuals stay correlated for longer than a block (`runtime.core.residuals.unseen_by_blocks`). A
+parameter differs if |d| exceeds 3 (`DIFFERS`). This limit is a convention, not a statistical test
+(benchmarks/truth.md). Differences up to 10 % of the value (RELEVANT_DIFFERENCE in limits.toml) do
+not change the verdict.
 
 Records differ if the robot changed (load, temperature, wear), if one record has an error, or if the
 model lacks an effect that appears in the motion of only some records.
@@ -105,7 +105,7 @@ class Homogeneity(Result, Part, keys="records parameters agree disagreements unt
     def records_differ(self) -> bool:
         """Whether a parameter differs between records by more than 10 % of its value.
 
-        The limit is LIMIT.RELEVANT_DIFFERENCE.
+        The limit is RELEVANT_DIFFERENCE in limits.toml.
         """
         return any(d.difference > LIMIT.RELEVANT_DIFFERENCE for d in self.disagreements)
 

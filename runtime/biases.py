@@ -6,11 +6,12 @@ torques are linear in X and depend on b through the motion of the base. By Gauss
     Y = W(b) X + S db + rho,    S = d(W X)/db,    b <- b + db ,
 
 with each joint weighed by its residual. W is of second degree in b_w and of first in b_f, so that
-central differences of W X are exact. One set of biases holds for all records. A prior of deviation
-PRIOR about the start, wider than the bias of any sensor, keeps a bias that the records do not show.
+central differences of W X are exact. One set of biases holds for all records. A prior about the
+start keeps a bias that the records do not show; its deviations (`PRIOR`) are wider than the bias of
+any sensor.
 
-The deviations of b are those of the linear problem [W S], with blocks of time as independent. Those
-of X get wider by what the biases may move: X(b) has the derivative -W^+ S.
+The deviations of b are those of the linear problem [W S], with blocks of time as independent. The
+deviations of X grow by what these deviations of b move: X(b) has the derivative -W^+ S.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from runtime.core.rows.observation import Observation, split_rows, stack
 from runtime.core.rows.prepared import observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.ground.errors import SettingsError
+from runtime.ground.limits import LIMIT
 from runtime.ground.part import Part
 from runtime.ground.progress import at
 from runtime.ground.table import Table
@@ -40,8 +42,7 @@ KIND = "biases"
 """Kind of the note that holds the Biases of a problem."""
 AXES = tuple(f"{sensor} {axis}" for sensor in ("gyroscope", "accelerometer") for axis in "xyz")
 UNITS = ("rad/s",) * 3 + ("m/s**2",) * 3
-PRIOR = np.array([0.2] * 3 + [2.0] * 3)  # deviations, rad/s and m/s**2
-LOOSE = 0.3  # of PRIOR: a larger deviation says that the records do not show the bias
+PRIOR = np.repeat(LIMIT.BIAS_PRIOR, 3)  # deviations, rad/s and m/s**2
 PASSES = 8  # of Gauss-Newton
 DONE = 0.1  # of the deviation of a bias: a smaller change ends the passes
 
@@ -68,7 +69,7 @@ class Biases(Part):
     @property
     def known(self) -> Array:
         """Whether the records show each bias, shape (6,)."""
-        return self.sigma < LOOSE * PRIOR
+        return np.asarray(self.sigma < LIMIT.BIAS_LOOSE * PRIOR)
 
     @property
     def intervals(self) -> list[str]:
@@ -96,7 +97,9 @@ class Biases(Part):
         return f"Biases of the sensor on the base (± 95 %): {', '.join(said)}"
 
     def warnings(self) -> tuple[str, ...]:
-        """Say that biases are larger than those of a sensor, which another mounting would explain."""
+        """Warn of biases that are larger than those of usual sensors; another mounting of the
+        sensor would explain them.
+        """
         large = [
             f"{axis} {b:.3g} {unit}"
             for axis, b, most, unit in zip(AXES, self.values, PRIOR, UNITS, strict=True)
@@ -123,13 +126,13 @@ class Biases(Part):
 def fitted_biases(problem: Problem) -> Problem:
     """Fit the biases of the sensor on the base, and subtract them in all records.
 
-    A step of the preparation of a problem, for records with the channel base_biases. Without
-    records, or once it is done, the problem is returned unchanged.
+    This is a step of the preparation of a problem, for records with the channel base_biases.
+    Without such records, or if the biases are fitted already, the problem is returned unchanged.
 
     Raises
     ------
     SettingsError
-        A record that has the channel beside one of the same problem that has not.
+        One record of the problem has the channel, and another has not.
     """
     if not problem.records or problem.noted(KIND) is not None:
         return problem

@@ -7,8 +7,8 @@
     EXTRAS     Identification -> Part: further analyses of the records
     QUESTIONS  Identification -> Check: what the verdict asks; a part asks its own
 
-Each call builds a Problem from model, records and study, prepares it by STEPS and passes it to one
-function of the package. A feature is one file and one line of a list.
+Each call builds a Problem from model, records and study, prepares it by the steps in `STEPS` and
+passes it to one function of the package. A feature is one file and one line of a list.
 """
 
 from __future__ import annotations
@@ -245,7 +245,7 @@ ARGUMENTS: dict[str, tuple[tuple[type, ...], str]] = {
 def entry(function: Callable[P, R]) -> Callable[P, R]:
     """Wrap a public function: its arguments are checked, and it runs with one BLAS thread.
 
-    InputError, in one sentence, for an argument of another type than in `ARGUMENTS`.
+    Raises InputError for an argument of another type than the table `ARGUMENTS` states.
     """
 
     @wraps(function)
@@ -267,7 +267,7 @@ def entry(function: Callable[P, R]) -> Callable[P, R]:
 def require_study(study: Study | None) -> Study:
     """Check that the argument is a Study; None becomes Study(), the default settings.
 
-    InputError for anything else.
+    Raise InputError for anything else.
     """
     study = Study() if study is None else study
     require_kind(
@@ -279,7 +279,7 @@ def require_study(study: Study | None) -> Study:
 def list_records(records: Records) -> tuple[Record, ...]:
     """Return one record or several records as a tuple.
 
-    InputError for anything else.
+    Raise InputError for anything else.
     """
     if isinstance(records, Record):
         return (records,)
@@ -299,7 +299,7 @@ def with_records(problem: Problem) -> Problem:
 def complete_study(study: Study) -> Study:
     """Check that method and reader of a study exist; complete the settings of the reader.
 
-    SettingsError if the method or the reader is unknown, or for a setting of another reader.
+    Raise SettingsError if the method or the reader is unknown, or for a setting of another reader.
     """
     _named(METHODS, study.estimate.method, ("estimate", "method"))
     reader, signals = reader_of(study.signals), study.signals
@@ -308,7 +308,7 @@ def complete_study(study: Study) -> Study:
         if f.name not in known and getattr(signals, f.name) != f.default:
             users = [name for name, one in READERS.items() if f.name in one.own_settings]
             raise SettingsError(
-                f"given, but reader is {signals.reader}; set reader: {' or '.join(users)}, or "
+                f"the reader {signals.reader} does not use this key; set reader: {' or '.join(users)}, or "
                 "remove this key",
                 path=("signals", f.name),
             )
@@ -316,7 +316,7 @@ def complete_study(study: Study) -> Study:
 
 
 def reader_of(signals: Signals) -> Reader:
-    """Return the reader that signals.reader names; SettingsError if it is unknown."""
+    """Return the reader that signals.reader names; raise SettingsError if it is unknown."""
     return _named(READERS, signals.reader, ("signals", "reader"))
 
 
@@ -364,7 +364,7 @@ def problem(
     unseen: Sequence[Record] = (),
     simulator: Simulator | None = None,
 ) -> Problem:
-    """Build a Problem from model, records and study, and apply every preparation step of `STEPS`.
+    """Build a Problem from model, records and study, and apply every preparation step.
 
     Parameters
     ----------
@@ -561,8 +561,8 @@ def estimate_of(
 ) -> Estimate:
     """Estimate the parameters of given rows Y = W X + rho by the method of `settings`.
 
-    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record it
-    takes most of the time.
+    The default method is ols. Without `corrected`, `sigma_corrected` is nan: on a long record, its
+    computation takes most of the time.
     """
     settings = settings or EstimateSettings()
     return estimate_by(
@@ -697,7 +697,8 @@ def assess(
 ) -> Identification:
     """Identify a robot and make every further analysis that the data allow (`symgen report`).
 
-    The analyses of EXTRAS are made as far as records, study and installed packages allow.
+    The analyses of the list `EXTRAS` are made as far as records, study and installed packages
+    allow.
 
     encoder : steps of the encoders in use, rad or m.
     progress : called with the name of each part before the part is computed.
@@ -740,8 +741,8 @@ def compare(
     Raises
     ------
     InputError
-        No candidate; one without validation records, or with other validation records than the
-        first; no candidate that can be identified.
+        There is no candidate; a candidate has no validation records, or others than the first; or
+        no candidate can be identified.
 
     Examples
     --------
@@ -922,7 +923,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search an exciting motion within the robot's limits, with the best criterion of the study.
+    """Search for an exciting motion within the robot's limits, with the best criterion of the study.
 
     The best motion over all starts of the search is returned. Without records, the values of the
     robot file serve as parameters.
@@ -947,7 +948,7 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """Search static poses that, with recorded poses, determine the gravity parameters best.
+    """Search for static poses that, with recorded poses, determine the gravity parameters best.
 
     study.excitation.poses is the number of new poses, default 20. All poses respect the limits of
     q.
@@ -977,10 +978,10 @@ def repair(
     further: Sequence[Record] | None = None,
     folder: str | Path | None = None,
 ) -> Repair:
-    """Search the lines of a study that are wrong, several at once, and write the mended study.
+    """Search for the lines of a study that are wrong, several at once, and write the mended study.
 
-    They are searched on some blocks of the records, and judged on the others and on the validation
-    records. All changes are kept, or none.
+    The lines are searched on some blocks of the records, and judged on the other blocks and on the
+    validation records. All changes are kept, or none.
 
     Parameters
     ----------

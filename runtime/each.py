@@ -54,8 +54,8 @@ def identify_each(
 
     FOLDER/NAME/ gets estimate.json, parameters.csv and study.yaml. Results that exist are kept if
     the measured files, the study, the robot, the options and the version are those of before; so an
-    interrupted call is continued by the same call. A record that cannot be used has its reason in
-    its row, and the others go on.
+    interrupted call is continued by the same call. If a record cannot be
+    used, its row gives the reason, and the other records are still identified.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def identify_each(
     study : Study
         Settings, with the files of all records (`record.files`, `record.also`).
     folder : str or Path
-        Made if it is missing. On a cluster, every machine needs it under this name, and the
-        measured files.
+        Folder of the results, which is made if it is missing. On a cluster, every machine needs
+        this folder and the measured files, under the same names.
     map : function
         Like the built-in map; identifies the records in processes
         (`runtime.parallel.processes.processes`) or on a Dask cluster (docs/many_runs.md).

@@ -8,29 +8,30 @@ torque errors of motions within the range of the robot.
     C       covariance S C_10 S of least squares with joints weighted by their residuals: C_10 of
             eq. (10), and S the diagonal matrix of corrected over stated standard deviations, times
             a factor for correlations longer than a block
-    V       the same, if the fit uses the values of the robot file, known to VALUES_KNOWN:
+    V       the same, if the fit uses the values of the robot file, known to 30 %:
             (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; the estimate
             of the standard parameters is then chi_V
     a       share of the accelerations that is an error of the encoder's steps
     D_0     D without accelerations
 
-    F a     torques of the laws that the model lacks, dX the change of X beside them
+    F a     torques of the laws that the model lacks, dX the change of X with them
             (`runtime.unmodelled`)
 
     expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2
                  + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2 + ||D dX + F a||^2/||D X||^2
 
-The first term is what the record leaves undetermined. The second is the difference between the fit
-and the joint estimate of record and values. The third is the amount by which the encoder steps make
+The first term is what the record leaves undetermined. The second term is the difference between the
+fit and the joint estimate of record and values. The third term is the amount by which the encoder steps make
 inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). The
-fourth is what the model lacks; the first two are then multiplied by the share of the squared error
+fourth term is what the model lacks; the first two terms are then multiplied by the share of the squared error
 that the laws leave. Other effects that the model lacks are included only as far as they are in the
 residuals of C.
 
-The squared error of one record is a sum of b squares, a few of which are large: with
-M = K'D'D K V it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
-interval of the expected error has the first two terms times quantiles of this distribution, and the
-third times STEPS_MOVE, the fourth times LAWS_MOVE. If one direction is undetermined, nu is 1: 30 % expected may be 2 %.
+The squared error of one record is a sum of b squares, a few of which are large: with M = K'D'D K V
+it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The interval of the
+expected error has the first two terms times quantiles of this distribution, the third times two
+factors (`STEPS_MOVE`), and the fourth times two others (`LAWS_MOVE`). If one direction is
+undetermined, nu is 1; an expected error of 30 % may then be an error of 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -153,8 +154,10 @@ class ExpectedError(Part):
 
     @cached_property
     def unseen_error(self) -> float:
-        """Error on a part of the record that its other parts explain, %; nan if not computed."""
-        return unseen_error(self.result) if self.result.held_out_rows else float("nan")
+        """Error that parameters from other parts of the record may have on one part, %; nan if it
+        is not computed.
+        """
+        return unseen_error(self.result)
 
     @cached_property
     def lacking(self) -> Lacking | None:
@@ -242,10 +245,11 @@ def has_prior(fit: Estimate) -> bool:
 def determined_by(
     model: GeneratedModel, system: System, least_squares: Estimate, prior: bool
 ) -> tuple[Array, Array, Array]:
-    """Compute K, the parameters and their covariance V that rows determine, with or without values.
+    """Compute K, and the parameters with covariance V that the rows determine, with or without
+    values of the robot file.
 
     Without the values of the robot file (`prior`), K is the identity and the parameters are X, else
-    X = K chi and they are chi_V.
+    X = K chi and the parameters are chi_V.
     """
     ratio = least_squares.sigma_corrected / least_squares.sigma
     wider = np.fmax(ratio, 1.0) * np.sqrt(unseen_by_blocks(system.observation, least_squares))
@@ -266,18 +270,16 @@ def undetermined(A: Array, V: Array) -> tuple[float, float]:
 
 
 def unseen_error(result: Identification) -> float:
-    """Compute how far a part of the record may be off because the other parts do not tell, %.
+    """Compute how large the error on a part of the record may be, given what the other parts
+    determine, %.
 
-    The largest error that parameters from the other parts explain, in % of the torques of the part:
-    the upper limit of tr(W V W'), with W the rows of the part and V of the other parts, and the
-    error of the fit. It is inf if the other parts do not determine V.
+    The result is in % of the torques of the part. It combines the upper limit of tr(W V W'), with W
+    the rows of the part and V the covariance from the other parts, and the error of the fit. The
+    result is inf if the other parts do not determine V, and nan if there are no parts.
     """
-    observation, problem = result.observation, result.problem
-    most = 0.0
-    for rest, part in result.held_out_rows:
-        system = weighted_system(
-            observation.where(rest), "joint", problem.settings.estimate.columns
-        )
+    most = float("nan")
+    for rest, part in result.held_out:
+        system = weighted_system(rest, "joint", result.problem.settings.estimate.columns)
         solution = system.solve()
         if solution.rank < len(system.names):
             return float("inf")
@@ -287,10 +289,9 @@ def unseen_error(result: Identification) -> float:
         )
         if not np.isfinite(V).all():
             return float("inf")
-        at = [observation.names.index(name) for name in system.names]
-        spread, nu = undetermined(observation.W[np.ix_(part, at)] @ K, V)
+        spread, nu = undetermined(part.columns(system.names).factor.R11 @ K, V)
         upper = spread * chi2.ppf(EXPECTED_INTERVAL[1], nu) / nu
-        most = max(most, 100 * float(np.sqrt(upper) / np.linalg.norm(observation.Y[part])))
+        most = float(np.fmax(most, 100 * np.sqrt(upper) / np.linalg.norm(part.Y)))
     return float(np.hypot(most, result.model_estimate.relative_error))
 
 
@@ -328,7 +329,7 @@ def regressors(
     """Compute D and D_0, the regressors at the states with and without accelerations, (K, n, b).
 
     A channel, such as a temperature, has random values of the records; a torque that a joint
-    transmits is that of the other parameters of `fit` at the states.
+    transmits is the torque of the other parameters of `fit` at the states.
     """
     q, qd, qdd = states
     rng, channels = np.random.default_rng(0), channels_of(model)
@@ -388,7 +389,7 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
 def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
     """Return joint ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file.
 
-    None if a limit is missing or not finite.
+    The result is None if a limit is missing or not finite.
     """
     limits = dict(getattr(model, "LIMITS", {}) or {})
     n = len(model.JOINTS)
@@ -409,7 +410,7 @@ def reference_states(
 ) -> tuple[Array, Array, Array] | None:
     """Make random states q, qd, qdd of sine motions in the range of the robot, shape (K, n) each.
 
-    None if neither the robot file nor a record gives a range.
+    The result is None if neither the robot file nor a record gives a range.
     """
     n = len(model.JOINTS)
     limits = limits_of(model)

@@ -90,7 +90,7 @@ def report(
 def files_of(result: object, folder: Path, study: Study) -> Files:
     """Make the contents of all files of a result, as a mapping from file name to content.
 
-    InputError for a result that has no files.
+    Raise InputError for a result that has no files.
     """
     raise InputError(
         f"{type(result).__name__} cannot be written to files; expected an Identification, "
@@ -141,7 +141,9 @@ def _(result: Identification, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Ranking, folder: Path, study: Study) -> Files:
-    """Make the result files of a comparison of studies, and those of its best identification."""
+    """Make the result files of a comparison of studies, and the result files of its best
+    identification.
+    """
     section = Section(
         "Treatments compared", (result.verdict, *result.missing), tables=(result.table(),)
     )
@@ -202,7 +204,7 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 def _(result: StaticPoses, folder: Path, study: Study) -> Files:
     """Make the files of static poses: table (column t: number of the pose), JSON data and page.
 
-    With columns of measured torques added, the table is a record.
+    If a user adds columns of measured torques, the table is a record.
     """
     page = Page("Poses at rest", "", [Section(result.model.NAME, listing=result.to_table())])
     t = np.arange(1.0, len(result.poses) + 1)

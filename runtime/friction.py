@@ -12,7 +12,7 @@
     stribeck+load     both
 
 Every term is computed at the rate of the record and decimated like Y, so that the filter rounds
-sign(v) on both sides in the same way. Every law contains the first one. All parameters are linear
+sign(v) on both sides in the same way. Every law contains the first law. All parameters are linear
 except VS, which is searched; therefore the F-test of VS is approximate (VS means nothing if FST =
 0). Residuals are correlated in time: standard deviations take blocks of time as independent, and
 the F-test and Akaike's criterion count N/T samples, with T the correlation time of the residual in
@@ -221,7 +221,8 @@ class Friction(Part):
 def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
     """Make the figure of friction torque against velocity, with one plot per joint.
 
-    It shows the rows in grey, the bins with their 95 % intervals, the first law and the chosen law.
+    The figure shows the rows in grey, the bins with their 95 % intervals, the first law and the
+    chosen law.
     """
     speed = "m/s" if unit == "N" else "rad/s"
     first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
@@ -315,7 +316,7 @@ def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
     """Find the base parameters that contain only friction and offset of joint j (from 0).
 
-    These define the friction curve of the joint.
+    These parameters define the friction curve of the joint.
     """
     physical = physical_model(model)
     elements = elements_of(model)
@@ -550,8 +551,8 @@ def fit_law(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
     """Find the Stribeck velocity VS that gives the least sum of squared residuals of a law.
 
-    With e the Stribeck term orthogonal to the other terms, and r the residual of the other terms,
-    it reduces the sum of squares by (e'r)^2 / e'e.
+    With e the part of the Stribeck term that is orthogonal to the other terms, and r the residual
+    of the other terms, the Stribeck term reduces the sum of squares by (e'r)^2 / e'e.
     """
     others = _columns(terms, [name for name in names if name not in ("FST", "VS")], None)[rows]
     U, s, _ = np.linalg.svd(others, full_matrices=False)

@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 def at(place: str) -> Any:
-    """Import the module of a place "module:name", and return what it calls `name`."""
+    """Import the module of a place "module:name", and return its attribute `name`."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)
 
@@ -58,7 +58,9 @@ class PartWhen:
 
 
 class Listed(MutableMapping[str, T]):
-    """Objects by name, in their order; a place "module:name" is imported when it is asked for."""
+    """Objects by name, in their order; an object at a place "module:name" is imported when it is
+    first used.
+    """
 
     def __init__(self, listed: Mapping[str, T | str]) -> None:
         self._listed = dict(listed)

@@ -18,7 +18,7 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 def stated_sides(problem: Problem) -> Problem:
     """Note in each record the sides of the gears at which it was measured, as the study states them.
 
-    This is a step of the preparation of a problem. Records that tell their own sides
+    This is a step of the preparation of a problem. Records that state their own sides
     (`Origin.sides`) are not changed.
     """
     settings: Any = problem.settings
@@ -32,7 +32,8 @@ def stated_sides(problem: Problem) -> Problem:
 
 
 def _with_sides(records: Sequence[Record], stated: Sequence[Any]) -> tuple[Record, ...]:
-    """Give each record that does not tell its sides those of its settings, one for each record.
+    """Give each record without stated sides the sides of its settings, which are one entry per
+    record.
 
     If the numbers of records and settings differ, all settings must have the same side of torques.
     """
@@ -52,13 +53,13 @@ def _with_sides(records: Sequence[Record], stated: Sequence[Any]) -> tuple[Recor
 def torques_of_links(problem: Problem) -> Problem:
     """Leave friction and inertia of drives out of the fit if torques are measured behind gears.
 
-    This is a step of the preparation of a problem. It acts only if estimate.columns is all.
+    This is a step of the preparation of a problem. The step acts only if estimate.columns is all.
 
     Raises
     ------
     SettingsError
-        Torques that are measured behind the gears in one record and not in another, or not in the
-        record of whose file the study states that they are.
+        Torques are measured behind the gears in one record and not in another, or the study states
+        this for a file whose record states otherwise.
     """
     settings: Any = problem.settings
     sides = [(record.file, record.sides[1]) for record in (*problem.records, *problem.unseen)]
@@ -77,9 +78,10 @@ def torques_of_links(problem: Problem) -> Problem:
 
 
 def _require_one_side(sides: Sequence[tuple[str, str]]) -> bool:
-    """Whether torques are measured behind the gears; SettingsError if in one file and not in another.
+    """Whether torques are measured behind the gears; raise SettingsError if this holds for one file
+    and not for another.
 
-    sides : file, and side of its torques.
+    sides : name of each file, and side of its torques.
     """
     behind = sorted({name for name, tau in sides if tau == "link"})
     others = sorted({name for name, tau in sides if tau != "link"})

@@ -1,8 +1,9 @@
-"""Tell whether the running median of the torques (`signals.torque_median`) removes motion.
+"""Find out whether the running median of the torques (`signals.torque_median`) removes torque of
+the motion.
 
 A controller that reacts to each count of an encoder drives the motor in pulses. The mean of these
 pulses moves the robot, but a median removes them. Let d be the change of the torque tau of a joint
-by the median. With means over blocks of TORQUE_BLOCK,
+by the median. With means over blocks of 0.1 s (`TORQUE_BLOCK`),
 
     d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
 

@@ -44,7 +44,7 @@ def poses_at_rest(problem: Problem) -> Problem:
     InputError
         No parameter causes a torque in the poses.
     SettingsError
-        A method that simulates the closed loop, because it needs a motion.
+        The method simulates the closed loop, for which it needs a motion.
     """
     settings = problem.settings
     if not problem.reader.at_rest or not problem.records:

@@ -11,9 +11,9 @@
 
     C = (sum_j W_j'W_j / S_j^2)^-1  mean(psi^2) / mean(psi')^2  r / (r - b),    psi = w u
 
-Both constants give 95 % efficiency under normal noise. If more than 5 % of the rows of a joint
-have w < 0.5, the model is wrong there, and these rows are not outliers. options: loss, tuning (k or
-c), passes, block, rank_tolerance.
+Both constants give 95 % efficiency under normal noise. If more than 5 % of the rows of a joint have
+w < 0.5, these rows are not outliers: the model is wrong there. options: loss, tuning (k or c),
+passes, block, rank_tolerance.
 
 References: Huber and Ronchetti, Robust Statistics (2009), chapter 7; Maronna, Martin and Yohai,
 Robust Statistics (2006), chapters 4 and 5.

@@ -1,4 +1,4 @@
-"""Is the sensor on a base that moves mounted, and are its units, as the study says?
+"""Check whether mounting and units of the sensor on a base that moves are as the study states.
 
 A gyroscope reads w and an accelerometer f in the axes of the sensor. Another reading of the record,
 
@@ -7,7 +7,7 @@ A gyroscope reads w and an accelerometer f in the axes of the sensor. Another re
 has a rotation G by multiples of 90 degrees (24 of them), the sign s of the accelerometer, and the
 factors u and v of the units deg/s and g where the size of the signals suggests them. Each reading
 gives another motion of the base, hence other rows. The parameters are fitted to a part of the rows
-of each reading; one that halves the error is told.
+of each reading; a reading that halves the error is reported.
 """
 
 from __future__ import annotations
@@ -22,24 +22,23 @@ from runtime.core.record import BASE_IMU
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.base import INPUTS
+from runtime.ground.limits import LIMIT
 from runtime.ground.part import Doubt
 
 Array = np.ndarray
-DOUBTED = 10.0  # % of the torques: less unexplained needs no other reading
 INSTANTS = 300  # of all records
 STANDARD_GRAVITY = 9.80665  # m/s**2
-STILL, HEAVY = 3.0, 40.0  # m/s**2: medians of |f| outside are of another unit
-FAST = 20.0  # rad/s: a base that turns faster is read in deg/s
 RIDGE = 1e-12  # of the largest eigenvalue of W'W
 
 
 def sensor_axes(result: Identification) -> Doubt | None:
-    """Tell a rotation, sign or unit of the sensor on the base that explains the record much better.
+    """Report a rotation, sign or unit of the sensor on the base that explains the record much
+    better.
 
-    None without a sensor, or if no other reading halves the error.
+    The result is None if there is no sensor, or if no other reading halves the error.
     """
     owned = [own for own in result.problem.prepared if BASE_IMU in own.record.channels]
-    if not owned or result.estimate.relative_error < DOUBTED:
+    if not owned or result.estimate.relative_error < LIMIT.AXES_DOUBTED:
         return None
     samples = [_sampled(own, INSTANTS // len(owned)) for own in owned]
     readings = list(product(ROTATIONS, (1.0, -1.0), _factors(samples)))
@@ -81,7 +80,9 @@ class _Samples:
 
 
 def _lever(w: Array, wd: Array, r: Array) -> Array:
-    """Return wd x r + w x (w x r): what an accelerometer at r reads beside one at the origin."""
+    """Return wd x r + w x (w x r): the difference between the readings of an accelerometer at r and
+    one at the origin.
+    """
     return np.asarray(np.cross(wd, r) + np.cross(w, np.cross(w, r)))
 
 
@@ -94,8 +95,9 @@ def _factors(samples: list[_Samples]) -> list[tuple[float, float]]:
     """List factors of the gyroscope and of the accelerometer that the size of the signals suggests."""
     f = float(np.median([np.median(np.linalg.norm(s.f, axis=1)) for s in samples]))
     w = max(float(np.abs(s.w).max()) for s in samples)
-    of_f = STANDARD_GRAVITY if f < STILL else 1 / STANDARD_GRAVITY if f > HEAVY else 1.0
-    return [*dict.fromkeys(product((1.0, *([np.pi / 180] * (w > FAST))), (1.0, of_f)))]
+    least, most = LIMIT.FORCE_OF_SI
+    of_f = STANDARD_GRAVITY if f < least else 1 / STANDARD_GRAVITY if f > most else 1.0
+    return [*dict.fromkeys(product((1.0, *([np.pi / 180] * (w > LIMIT.FAST_BASE))), (1.0, of_f)))]
 
 
 def _error(
@@ -103,7 +105,7 @@ def _error(
 ) -> float:
     """Fit the parameters to the rows of one reading; return the relative error of the torques.
 
-    Each row of the torques counts by its own size.
+    Each joint is weighted by the size of its torques.
     """
     rows, torques = [], []
     scale = np.sqrt(sum((x.Y**2 * x.used).sum(axis=1) for x in samples))

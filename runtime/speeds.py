@@ -5,15 +5,15 @@
 
 v is the recorded velocity. The noise of a differentiated position grows with the frequency, the
 noise of v does not: below f_c differences of q have less noise, above f_c v has less noise. The
-weight L gives the least variance at every frequency. It is a Butterworth filter of first order,
+weight L gives the least variance at every frequency. L is a Butterworth filter of first order,
 applied forward and backward.
 
 The velocity of a drive may be filtered, delayed, or in another unit. On the motion itself,
 
     v = gain (dq/dt - lag d2q/dt2) + rest,
 
-and v of a joint is not used if the errors of gain and lag exceed LIMIT.SPEED_DISAGREES of the
-velocity.
+and v of a joint is not used if the errors of gain and lag exceed a share of the velocity
+(SPEED_DISAGREES in limits.toml).
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def crossings(
 def recorded_speeds(problem: Problem) -> Problem:
     """Set the frequencies, Hz, above which recorded velocities replace differentiated positions.
 
-    This is a step of the preparation of a problem. It acts if signals.velocity is auto, the reader
-    uses recorded velocities, and all fitted records have them.
+    This is a step of the preparation of a problem. The step acts if signals.velocity is auto, the
+    reader uses recorded velocities, and all fitted records have them.
     """
     signals = problem.settings.signals
     if signals.velocity != "auto" or not problem.reader.velocities or not problem.records:

@@ -208,12 +208,12 @@ class Suggestion:
     ----------
     study : Study
     sentences : tuple of str
-        One on each change, for a person to check.
+        A sentence on each change, for a person to check.
     unrecognised : mapping of str to str
-        What a person must fill in: a key of the study, and what is not recognised there, such as
-        "positions of joints 4 to 6". Empty: all records can be read.
+        Settings that a person must fill in: a key of the study, and the data that were not
+        recognised, such as "positions of joints 4 to 6". If it is empty, all records can be read.
     candidates : mapping of str to tuple of str
-        Columns that may belong there, by key.
+        Columns that may have these data, by key.
     """
 
     study: Study
@@ -242,7 +242,7 @@ def suggested(study: Study, model: GeneratedModel, *, missing: bool = False) -> 
     Raises
     ------
     InputError
-        A file that cannot be read at all.
+        A file cannot be read at all.
     """
     sentences: list[str] = []
     while True:
@@ -294,10 +294,11 @@ def _set(settings: Mapping[str, Any], error: InputError) -> str:
 def _beyond_limits(
     settings: Sequence[RecordSettings], records: Sequence[Record], model: GeneratedModel
 ) -> str:
-    """Tell that no joint can be where the record has it, read as rad: degrees, or of motors.
+    """Report positions that are impossible in rad, because they are in degrees or on the motor
+    side.
 
-    The positions of every joint exceed the limits of the robot file more than `BEYOND` times; ""
-    otherwise.
+    The report is made if the positions of every joint exceed twice the limits of the robot file;
+    otherwise, the text is "".
     """
     limits = getattr(model, "LIMITS", {}).get("q", ())
     if not limits or not all(limits) or any(one.units.q != "rad" for one in settings):
@@ -326,7 +327,8 @@ def _with_settings(study: Study, settings: Mapping[str, Any]) -> Study:
 def _unfinished(
     study: Study, model: GeneratedModel, sentences: Sequence[str], error: InputError
 ) -> Suggestion:
-    """Set what the column names of the first record show, and name the rest.
+    """Make the settings that the column names of the first record show, and list the missing
+    settings.
 
     Raise `error` if the file has no columns that can be read.
     """
@@ -383,8 +385,9 @@ def _joints_text(numbers: Sequence[int]) -> str:
 def _starts_anew(settings: RecordSettings, model: GeneratedModel, missing: bool) -> bool:
     """Whether the recorded angles wrap around at full turns.
 
-    They do if unwrapping makes the largest step between two samples more than five times smaller,
-    and steps of that size are rare. In a wrong unit, such as degrees read as rad, they are not.
+    The angles wrap around if unwrapping makes the largest step between two samples more than five
+    times smaller, and steps of this size are rare. In a wrong unit, such as degrees read as rad,
+    such steps are frequent.
     """
     as_read, unwrapped = (
         np.concatenate(
@@ -413,8 +416,8 @@ def study_text(
 
     File names are relative to that folder.
 
-    defaults : True: every setting; False: only settings that differ from their default, and the
-        units of each record.
+    defaults : whether to write every setting; otherwise only settings that differ from their
+      default, and the units of each record.
     comments : comments at the ends of lines, by the keys that lead to the line.
     """
     mapping = to_mapping(
@@ -431,7 +434,9 @@ def study_text(
 
 
 def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings in `mapping` that differ from the defaults `usual`, nested ones too."""
+    """Return the settings in `mapping` that differ from the defaults `usual`, including nested
+    settings.
+    """
     return {
         key: _differing(value, usual[key])
         if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)

@@ -26,8 +26,9 @@ BLAS_THREADS = (
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
     """Wrap a function so that it runs with one BLAS thread.
 
-    Its matrices are small, and several threads wait for each other ten times as long as they
-    compute. Without the package threadpoolctl the number of threads is not changed.
+    The matrices of the function are small, so that several threads would wait for each other ten
+    times as long as they compute. Without the package threadpoolctl the number of threads is not
+    changed.
     """
 
     @wraps(function)

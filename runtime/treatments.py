@@ -1,20 +1,20 @@
 """Find which treatment of the records (choice of settings) predicts validation records best.
 
-A treatment is a choice of settings, for instance with all rows or without rows at rest, with the
-counterbalance torque known or not. Every candidate is identified with its own settings. Of its sets
-of parameters (`runtime.core.parameter_sets`), the essential set included, the set that predicts the
-validation records best is used. All candidates are then judged on the same rows, made by the
-filters and row selection of every candidate in turn, so that no candidate wins because it leaves
-out rows that it cannot explain,
+A treatment is a choice of settings, for instance with all rows or without rows at rest, or with or
+without a known torque of a counterbalance. Every candidate is identified with its own settings. Of
+its sets of parameters (`runtime.core.parameter_sets`), the essential set included, the set that
+predicts the validation records best is used. All candidates are then judged on the same rows, made
+by the filters and row selection of every candidate in turn, so that no candidate wins because it
+leaves out rows that it cannot explain,
 
     e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||
             residual of candidate c on the validation records treated as by candidate k, of the
             measured torque
 
 The measured torque includes known torques, so that a candidate with known torques gets no smaller
-error from the norm. The order is that of the geometric mean over k. A candidate whose estimator did
-not end well comes after all others. The validation records choose the winner, so they are no longer
-unseen data for it.
+error from the norm. Candidates are ordered by the geometric mean over k. A candidate whose
+estimator did not converge comes after all others. The validation records choose the winner, so they
+are no longer unseen data for it.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Ranking:
     def mean_errors(self) -> dict[str, float]:
         """Mean error, %, with which each treatment predicts the validation rows of all treatments.
 
-        It is the geometric mean of e_ck over k.
+        The mean is the geometric mean of e_ck over k.
         """
         return {
             name: float(np.exp(np.mean(np.log(list(own.values())))))
@@ -154,7 +154,7 @@ def compare(
     Parameters
     ----------
     problems : mapping of str to Problem
-        Prepared, by name of the treatment; their unseen records are of the same instants.
+        Prepared problems by name of the treatment, whose unseen records have the same instants.
     extras : sequence of Extra
         Further analyses of every treatment.
     judge : function of Identification
@@ -165,8 +165,8 @@ def compare(
     Raises
     ------
     InputError
-        No treatment; a treatment without validation records, or with other validation records than
-        the first; no treatment that can be identified.
+        There is no treatment; a treatment has no validation records, or others than the first; or
+        no treatment can be identified.
     """
     if not problems:
         raise InputError("no study to compare; expected two or more")

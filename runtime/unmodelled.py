@@ -1,4 +1,4 @@
-"""Torques that the model lacks: does the load, the position of a joint or the time explain its error?
+"""Torques that the model lacks: does load, position or time explain the error of a joint?
 
     e = Y - W X                   error of all parameters, joints weighted by their errors
     F                             columns of one law, in the rows of one joint:
@@ -9,10 +9,11 @@
     C_a = (F'M F)^-1 (sum_k s_k s_k') (F'M F)^-1,        s_k = (M F)_k' (e - M F a)_k
 
 over blocks k of time, so that the noise may be correlated; C_a grows by the factor of
-`block_correlation` for noise that is correlated for longer than a block. A law is found if
-a' C_a^-1 a/q exceeds what F(q, K - q) has with probability LIMIT.LAW_CERTAIN over all laws tried,
-and if a from one half of the blocks takes away error in the other half, both ways. The laws are
-found one after another, the surest first, each beside those before. The parameters then move by
+`block_correlation` for noise that is correlated for longer than a block. A law is found if a'
+C_a^-1 a/q exceeds the quantile of F(q, K - q) that belongs to the probability LAW_CERTAIN
+(limits.toml) over all laws tried, and if a from either half of the blocks reduces the error in the
+other half. The laws are found one after another, the most certain law first, and each law is fitted
+together with those found before. The parameters then become
 
     X + dX = X - (W'W)^-1 W'F a
 
@@ -40,7 +41,8 @@ from runtime.core.model import (
 from runtime.core.residuals import block_correlation, correlation_time, residual_correlation
 from runtime.core.result import Identification
 from runtime.core.rows.regressor import in_time
-from runtime.core.signals.filters import decimated
+from runtime.core.signals.decimation import PIECE, decimated_parts
+from runtime.core.signals.filters import States
 from runtime.ground.check import Answer, Question
 from runtime.ground.limits import LIMIT
 
@@ -73,7 +75,7 @@ class Law:
     a, sigma : ndarray, shape (q,), SI
         Factors of the columns, and their deviations.
     percent : float, %
-        Torque F a of the torque of the joint, rms.
+        Root mean square of the torque F a, in % of the torque of the joint.
     """
 
     j: int
@@ -84,7 +86,7 @@ class Law:
     percent: float
 
     def torque(self, q: Array, qd: Array, load: Array) -> Array:
-        """Torque of the law in other states of its joint, N m or N; zero for a law of the time."""
+        """Torque of the law in other states of its joint, N m or N; zero for a law of time."""
         if self.kind == "time":
             return np.zeros(len(q))
         return np.asarray(columns_of(self.kind, self.order, q, qd, load) @ self.a)
@@ -92,7 +94,7 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Lacking:
-    """All laws that are found, and the change of the parameters beside them.
+    """All laws that were found, and the change of the parameters if they are in the model.
 
     Attributes
     ----------
@@ -100,7 +102,7 @@ class Lacking:
     dX : ndarray, shape (b,)
         Change of the parameters of the fit if the model had the laws.
     before, after : ndarray, shape (n,), %
-        Error of each joint, and that with the laws.
+        Error of each joint without and with the laws.
     """
 
     laws: tuple[Law, ...]
@@ -121,7 +123,7 @@ class Lacking:
     f"{LIMIT.LAW_TAKES:g} % of its error",
 )
 def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
-    """Ask whether a law of load, position or time is found that the model lacks."""
+    """Answer the question whether the model lacks a law of load, position or time."""
     labels, names = joint_labels(model), model.JOINTS
     gain = lacking.before - lacking.after
     clear = 100 * gain >= LIMIT.LAW_TAKES * lacking.before
@@ -148,7 +150,8 @@ def depends(lacking: Lacking, model: GeneratedModel) -> Answer:
 def remedy_of(law: Law, joints: Sequence[int], unit: str) -> str:
     """Sentence that offers the law in the form of the robot file.
 
-    joints : numbers of the joints with such a law, the joint of the law first. unit : of its torque.
+    joints : numbers of the joints with such a law, the joint of the law first. unit : unit of its
+      torque.
     """
     along = joints[0] if len(joints) == 1 else sorted(joints)
     if law.kind == "load":
@@ -189,35 +192,53 @@ def friction_columns(model: GeneratedModel, names: Sequence[str]) -> Array:
     return np.array([elements.get(name, ("",))[0] in ("coulomb", "viscous") for name in names])
 
 
-def with_sign(result: Identification) -> tuple[Array, Array]:
-    """Compute |tau_j| sign(qd_j) and sign(qd_j) in the rows of the observation, shape (r,) each.
+def with_sign(result: Identification, step: int) -> tuple[Array, Array]:
+    """Compute |tau_j| sign(qd_j) and sign(qd_j) in every `step`-th row of each joint.
 
     Both are computed at the rate of the record and decimated like the torques, so that a reversal
-    is rounded in the same way. tau_j is the torque of the parameters without friction.
+    is rounded in the same way. tau_j is the torque of all parameters except those of friction.
     """
     model, fit = result.model, result.estimate
-    names = model.BASE_PARAMETERS
+    names, n = model.BASE_PARAMETERS, len(model.JOINTS)
     X = np.array([fit[name] if name in fit.names else 0.0 for name in names])
     X[friction_columns(model, names)] = 0.0
-    parts = []
+    parts: list[list[Array]] = [[] for _ in range(n)]
+    before = np.zeros(n, dtype=int)  # rows of each joint in the records before
     for record in result.prepared:
         selection = record.certain(model)
-        window = record.states[selection.samples]
-        states = (window.q, window.qd, window.qdd)
-        tau = cast(Any, model).inverse_dynamics(*states, X, **in_time(model, window))
-        signals = np.stack([np.abs(tau) * np.sign(window.qd), np.sign(window.qd)])
-        rows = decimated(np.moveaxis(signals, 1, -1), selection.factor, selection.signals.decimate)
-        parts.append([rows[:, j, selection.mask[j]] for j in range(len(model.JOINTS))])
-    joined = [part[j] for j in range(len(model.JOINTS)) for part in parts]
-    load, sign = np.concatenate(joined, axis=-1)
+        window, plan = record.states[selection.samples], selection.plan
+
+        def signals(t0: int, t1: int, window: States = window) -> Array:
+            own = window[t0:t1]
+            states = (own.q, own.qd, own.qdd)
+            tau = cast(Any, model).inverse_dynamics(*states, X, **in_time(model, own))
+            return np.vstack([(np.abs(tau) * np.sign(own.qd)).T, np.sign(own.qd).T])
+
+        used = [
+            np.flatnonzero(own)[-k % step :: step]
+            for own, k in zip(selection.mask, before, strict=True)
+        ]
+        before += selection.mask.sum(axis=1)
+        pieces = (
+            decimated_parts(signals, 2 * n, plan)
+            if plan is not None
+            else (
+                (slice(a, a + PIECE), signals(a, a + PIECE)) for a in range(0, len(window), PIECE)
+            )
+        )
+        for part, values in pieces:
+            for j, rows in enumerate(used):
+                own = rows[(rows >= part.start) & (rows < part.stop)] - part.start
+                parts[j].append(values[[j, n + j]][:, own])
+    load, sign = np.concatenate([own for of_joint in parts for own in of_joint], axis=-1)
     return load, sign
 
 
 def lacking_of(result: Identification) -> Lacking | None:
     """Find the laws that the model lacks, from the rows of an identification.
 
-    None if the method is not linear, the parameters are not determined, nothing moves, or the model
-    does not tell which of its parameters are friction.
+    The result is None if the method is not linear, the parameters are not determined, nothing
+    moves, or the model does not state which of its parameters are friction.
     """
     observation, fit, model = result.observation, result.estimate, result.model
     known = result.determined and result.usable and observation.motion is not None
@@ -245,7 +266,7 @@ def lacking_of(result: Identification) -> Lacking | None:
     if not usable:
         return None
     weight = 1 / np.where(size > 0, size, np.inf)[joint]
-    loaded, sign = (x[chosen] for x in with_sign(result))
+    loaded, sign = with_sign(result, step)
     blocks = observation.blocks((observation.span[1] - observation.span[0]) / BLOCKS)[chosen]
     t = observation.t[chosen] - observation.t[chosen].mean()
     t = t / (np.ptp(t) or 1.0)
@@ -270,11 +291,12 @@ def lacking_of(result: Identification) -> Lacking | None:
 
 
 def with_lacking(result: Identification) -> Identification:
-    """Find the laws that the model lacks, and widen the deviations by what they move.
+    """Find the laws that the model lacks, and increase the deviations of the parameters by the
+    changes that the laws cause.
 
-    The deviation of a parameter becomes sqrt(s^2 + dX^2): X is off by dX if the parameter is that of
-    a model with the laws, which no resampling of this record shows, since every part of the record
-    has the same laws.
+    The deviation of a parameter becomes sqrt(s^2 + dX^2): relative to a model with the laws, X has
+    the error dX. No resampling of this record shows this error, since every part of the record has
+    the same laws.
     """
     lacking = lacking_of(result)
     if lacking is None:
@@ -294,7 +316,7 @@ class Rows:
     count: Array
 
     def with_columns(self, rows: Array, F: Array) -> Rows:
-        """The same rows with further columns in some of them; e stays."""
+        """The same rows with further columns in some of them; e does not change."""
         more = np.zeros((len(self.e), F.shape[1]))
         more[rows] = F
         return Rows(np.column_stack([self.W, more]), self.e, self.blocks, self.count)
@@ -302,7 +324,9 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A law that is tested: joint, kind, order, rows of the joint, and its weighted columns there."""
+    """A law that is tested: joint, kind, order, rows of the joint, and its weighted columns in
+    these rows.
+    """
 
     j: int
     kind: Kind
@@ -312,7 +336,7 @@ class Candidate:
 
 
 def search(own: Rows, candidates: Sequence[Candidate], size: Array, measured: Array) -> Lacking:
-    """Find laws one after another, and fit all of them together."""
+    """Find missing laws one after another, and fit all of them together."""
     found: list[Candidate] = []
     b, system = own.W.shape[1], own
     level = LIMIT.LAW_CERTAIN / max(len(candidates), 1)
@@ -345,7 +369,9 @@ def search(own: Rows, candidates: Sequence[Candidate], size: Array, measured: Ar
 
 
 class Projector:
-    """Least squares of the error e by the columns of a system, and what further columns add."""
+    """Least squares of the error e by the columns of a system, and the improvement by further
+    columns.
+    """
 
     def __init__(self, system: Rows) -> None:
         W, norm = system.W, np.linalg.norm(system.W, axis=0)
@@ -369,7 +395,9 @@ class Projector:
         return np.asarray(np.sqrt(np.sum((self.T[at] @ scores.T) ** 2, axis=1)))
 
     def p_value(self, one: Candidate) -> float:
-        """Probability of the coefficients of a law if there is no such law; 1 if it does not help."""
+        """Probability of the coefficients of a law if there is no such law; 1 if the law does not
+        reduce the error.
+        """
         F, rows = one.F, one.rows
         G = self.T.T @ (self.W[rows].T @ F)
         B = F.T @ F - G.T @ G
@@ -394,7 +422,7 @@ class Projector:
         return p if p > LIMIT.LAW_CERTAIN or self.helps(MF) else 1.0
 
     def helps(self, MF: Array) -> bool:
-        """Whether the law from the even blocks takes away error in the odd ones, and vice versa."""
+        """Whether the law from the even blocks reduces the error in the odd blocks, and vice versa."""
         even = self.blocks % 2 == 0
         for fit, unseen in ((even, ~even), (~even, even)):
             a = np.linalg.lstsq(MF[fit], self.left[fit], rcond=None)[0]

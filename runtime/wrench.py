@@ -2,8 +2,8 @@
 
 A sensor before link j measures the wrench (force and moment) that moves link j and the links behind
 it, in the axes of frame j about its origin. This wrench equals the torques of six additional joints
-that stay at zero, as the base wrench is that of a floating base. So the model with a sensor has six
-more joints, which do not move,
+that stay at zero, in the same way as the base wrench of a floating base. So the model with a sensor
+has six more joints, which do not move,
 
     [Y ]   [D K]         [0]
     [  ] = [   ] chi  +  [ ] b ,        w = WS(q, qd, qdd) chi + b
@@ -16,8 +16,8 @@ no parameter of the drives: the moment of the rotor itself on the base (its iner
 ratio, once) is neglected.
 
 The base parameters differ from those of the module. They are found numerically, for the constants
-of the robot file: the columns that do not depend on the columns before them, at random states, and
-the linear combinations of standard parameters that belong to these columns (Gautier 1991).
+of the robot file, as the columns that do not depend on the columns before them, at random states,
+and the linear combinations of standard parameters that belong to these columns (Gautier 1991).
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ def force_sensors(problem: Problem) -> Problem:
     Raises
     ------
     InputError
-        Torques in A or V beside a wrench in N and N m, since both share parameters.
-        A module without the function base_wrench_regressor or without the frame of a sensor, a
-        robot with loops and a sensor that is not below it, a record without one of the sensors, and
-        a reader of encoder counts.
+        Torques are in A or V although the wrench is in N and N m and both share parameters; the
+        module has no function base_wrench_regressor, or lacks the frame of a sensor; a robot with
+        loops has a sensor that is not below it; a record lacks one of the sensors; or the reader is
+        that of encoder counts.
     """
     records = (*problem.records, *problem.unseen)
     channels = sorted({c for r in records for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
@@ -116,7 +116,7 @@ class WrenchModel:
     sensors : sequence of int
         Numbers of the frames in which the sensors measure; 0 is the base.
     torques : bool
-        Whether joint torques are measured too. The base parameters depend on this.
+        Whether joint torques are measured too; the base parameters differ in the two cases.
     """
 
     DRIVES = None

@@ -1,14 +1,14 @@
 """Demonstration of a book chapter: identify the Staubli TX40 and judge its encoder resolution.
 
-The record is the public one, or a simulated one if that cannot be fetched. Results are compared
-with the published Tables 2, 3, 4 and Figure 4.
+The record is the public record, or a simulated record if the public record cannot be fetched.
+Results are compared with the published Tables 2, 3, 4 and Figure 4.
 
     prepared = prepare(quick=False)             # model, study, record
     demo = demonstrate(prepared, quick=False)   # identification and resolution
     demo.verdict, demo.files(folder)
 
-Settings are those of the dataset and design defaults. They were chosen before the comparison with
-the published tables; nothing is tuned to the tables.
+The settings are those of the dataset and the defaults of symgen, which were chosen before the
+comparison with the published tables; no setting is tuned to the tables.
 
 Source: Experimental Identification of the Inverse Dynamic Model: Minimal Encoder Resolution Needed,
 Application to an Industrial Robot Arm and a Haptic Interface, in Robot Manipulators, M. Ceccarelli
@@ -123,7 +123,7 @@ class Prepared:
     model : module
         Emitted module.
     study : Study
-        Its file names are relative to the output folder.
+        Study whose file names are relative to the output folder.
     record : Record
     note : str
         Reason why the record is simulated; "" for a measured record.
@@ -259,9 +259,10 @@ class Demonstration:
     prepared : Prepared
     result : Identification
     resolution : Cestac
-        At the encoder steps of Table 3.
+        Results at the encoder steps of Table 3.
     curve, torque : Cestac or None
-        At more position steps, and with the torque steps of Table 4; None in the quick form.
+        Results at more position steps, and with the torque steps of Table 4; None in the quick
+        form.
     """
 
     prepared: Prepared
@@ -325,7 +326,9 @@ def sections(demo: Demonstration) -> list[Section]:
 
 
 def differences(demo: Demonstration) -> dict[str, float]:
-    """Return the differences, %, of the essential parameters from those of Table 2 of the chapter."""
+    """Return the differences, %, of the essential parameters from the values in Table 2 of the
+    chapter.
+    """
     fit = demo.result.essential.estimate
     return {n: percent(fit[n], value) for n, value in TABLE_2.items() if n in fit.names}
 

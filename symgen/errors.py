@@ -44,7 +44,7 @@ def printable(text: str) -> str:
 def require(given: object, kinds: type | tuple[type, ...], name: str, expected: str) -> None:
     """Raise SymgenError, in one sentence, unless the argument `name` has one of these types.
 
-    True and False are no numbers here. `expected` says which values there are.
+    True and False do not count as numbers. `expected` describes the possible values.
     """
     allowed = kinds if isinstance(kinds, tuple) else (kinds,)
     if not isinstance(given, allowed) or (isinstance(given, bool) and bool not in allowed):
@@ -75,7 +75,7 @@ class CertificateError(SymgenError):
     Parameters
     ----------
     message : str
-        Which check failed.
+        Sentence on the check that failed.
     certificate : object
         The Certificate.
     """
@@ -121,13 +121,13 @@ class ExpressionError(SymgenError):
     Parameters
     ----------
     message : str
-        What was found and what was expected.
+        Sentence on the text that was found and the text that was expected.
     text : str
         The whole expression.
     column : int, optional
         Column of the error in the expression, from 1.
     advice : str
-        What to write instead; it ends the message.
+        Sentence on a correct text, at the end of the message.
     """
 
     def __init__(

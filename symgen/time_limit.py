@@ -1,6 +1,6 @@
 """Limit the processor time of a derivation.
 
-So for any robot file, a command ends with a result or with one sentence.
+The limit ensures that a command ends with a result or with one sentence for any robot file.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _end: ContextVar[tuple[float, str]] = ContextVar("_end", default=(math.inf, ""))
 
 @contextmanager
 def limited(what: str) -> Iterator[None]:
-    """Limit the processor time of the block: after SECONDS, `require_time` raises an error.
+    """Limit the processor time of the block: after ten minutes (`SECONDS`), `require_time` raises
+    an error.
 
     what : name of the task for the message, such as "the regrouping of tx40".
     """

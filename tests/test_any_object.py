@@ -159,6 +159,17 @@ def _table(folder: Path) -> dict[str, Row]:
             {"result": 1, "folder": folder},
             {"result": set(), "folder": set(), "study": set()},
         ),
+        "identify_each": (
+            runtime.identify_each,
+            {"model": MODEL, "study": STUDY, "folder": folder},
+            {
+                key: set()
+                for key in (
+                    "model", "study", "folder", "map", "progress", "physical", "friction",
+                    "variants", "plausible",
+                )
+            },
+        ),
         "resample": (
             runtime.resample,
             {"t": T, "x": Q},

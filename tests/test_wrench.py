@@ -126,7 +126,10 @@ def test_a_file_names_six_columns_and_a_wrist_knows_what_is_behind_it(tmp_path: 
     read = runtime.read_record(study.record[0], model, folder=tmp_path)
     np.testing.assert_allclose(read.channels["wrench6"], wrench, rtol=1e-12)
     result = runtime.identify(model, read, study, physical=True, plausible=True)
-    assert any("not judged for a robot with force sensors" in text for text in result.missing)
+    assert any(
+        "check of record and study does not support force sensors" in text
+        for text in result.missing
+    )
     fit, X = result.estimate, result.model.base_parameters([*chi, *BIAS])
     assert len(fit.names) == 16 and result.determined and result.usable
     assert all(name.removesuffix("R")[-1] == "6" for name in fit.names)

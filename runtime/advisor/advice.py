@@ -42,7 +42,7 @@ FEW = (
     "if you need few parameters, name them: --columns ZZ1R,MX2R of symgen report and cestac, or "
     "cestac: {columns: [ZZ1R, MX2R]} of the study"
 )
-"""The way to a judgement of the parameters alone that are needed."""
+"""Remedy: judge only the parameters that the user needs."""
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,10 @@ class Limit:
         1 or 5: least squares is practically unbiased below, or biased above. The limit of a
         parameter is `percent`, or a tenth or half of its 95 % interval if that is more.
     delta : float, rad or m
-        inf if no step reaches it; nan if even the finest step exceeds it.
+        inf if no step reaches the limit; nan if even the finest step exceeds the limit, or if no
+        parameter is judged.
     parameter : str
-        The first parameter that reaches it; "" if there is none.
+        The first parameter that reaches the limit; "" if there is none.
     change : float, %
         Limit of this parameter.
     sampled : Sampled or None
@@ -129,8 +130,8 @@ class Limit:
     def agrees(self) -> bool:
         """Whether CESTAC runs at the coarsest step confirm the predicted change of the parameter.
 
-        The difference may be the Student interval plus 30 % of %e, which is 15 % in Delta. True
-        without runs.
+        A difference up to the Student interval plus 30 % of %e (15 % in Delta) is allowed. Without
+        runs, the result is True.
         """
         return (
             self.sampled is None
@@ -190,7 +191,7 @@ class ReaderAdvice:
         All together first, then one at a time.
     notes : tuple of str
     steps : ndarray, shape (len(asked), b), %
-        Change at the requested steps of all encoders; nan if the records do not show it.
+        Change at the requested steps of all encoders; nan if the records do not show this change.
     """
 
     reader: str
@@ -215,14 +216,14 @@ class Advice(Result, Part):
     asked : tuple of float, rad or m
         Requested steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
-        Change predicted at the requested steps by the chapter's rounding law. Under law phase, it
-        is the change with real encoders, read as the study reads them; nan if the records do not
-        show it.
+        Change predicted at the requested steps by the chapter's rounding law. Under the law phase,
+        the change is that of real encoders, read as the study reads them; nan if the records do not
+        show this change.
     torque_sigma : ndarray, shape (b,)
         Standard deviation of the parameters for white torque noise of the motors of standard
         deviation 1 N m (N).
     real : tuple of ReaderAdvice
-        Real encoders read as positions, and as counts; empty if they were not asked for.
+        Real encoders read as positions, and as counts; empty if they were not requested.
     assumptions : tuple of str
     settings, provenance : mapping
     """
@@ -287,7 +288,7 @@ class Advice(Result, Part):
     def unit(self) -> str:
         """Unit of the encoder steps: "rad", "m", or "rad or m" for encoders of both kinds.
 
-        It is that of the first advice, usually on all encoders together.
+        The unit is that of the first advice, usually on all encoders together.
         """
         return self.encoders[0].unit
 
@@ -760,8 +761,8 @@ def deciding_columns(reference: Estimate) -> list[int]:
 def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
     """Find the coarsest encoder steps that do not bias a parameter visibly, and that do not bias it.
 
-    nan if the finest step is already too coarse or none could be tried; inf if every step is fine
-    enough.
+    A limit is nan if the finest step is already too coarse or no step could be tried; inf if every
+    step is fine enough.
     """
     if not len(delta):
         return tuple(Limit(percent, np.nan, "") for percent in LIMITS)
@@ -787,8 +788,8 @@ def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, 
 def crossing(delta: Array, e: Array, percent: float) -> float:
     """Find the smallest encoder step at which the change e of a parameter reaches `percent`.
 
-    Between the points of the curve, lines are straight on logarithmic axes. nan if no point reaches
-    `percent`, or if the first point is already above.
+    Between the points of the curve, lines are straight on logarithmic axes. The result is nan if no
+    point reaches `percent`, or if the first point is already above.
     """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):

@@ -56,7 +56,7 @@ from runtime.core.cestac.result import deciding_names, names_judged, weighed_cha
 from runtime.core.cestac.rounding import VARIANCE
 from runtime.core.drives import Drives
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.model import GeneratedModel, axes_of, joint_labels, joint_units
+from runtime.core.model import GeneratedModel, joint_labels, joint_units, require_no_axes
 from runtime.core.problem import Problem, estimated
 from runtime.core.record import Record
 from runtime.core.result import Identification
@@ -490,10 +490,7 @@ def assumptions(
 
 def _refuse(problem: Problem) -> None:
     """Raise an error for problems for which no prediction is possible."""
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(
-            f"the advisor supports only encoders of joints, not {axes[0]}; identify {axes[1]}"
-        )
+    require_no_axes(problem.model, "the advice on encoders of joints")
     study = problem.settings
     if not problem.method.linear:
         raise SettingsError(

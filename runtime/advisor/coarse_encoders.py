@@ -12,9 +12,9 @@ this choice of rows is no error of the encoder and is not part of the change;
 
 The mean over the random phase of law phase is a quadrature. Its nodes (phases) are equidistant, and
 shuffled from encoder to encoder, so that harmonics of the sawtooth that are linear in the estimate
-cancel; the bias is left. Further nodes are as many again, in the middle between the known ones. One
-reading of all encoders serves every choice S. The first phase gives the errors of the counts and
-the knots of the motion, which the other phases use again.
+cancel; the bias is left. Each refinement adds as many nodes again, in the middle between the known
+nodes. One reading of all encoders serves every choice S. The first phase gives the errors of the
+counts and the knots of the motion, which the other phases use again.
 """
 
 from __future__ import annotations
@@ -126,8 +126,8 @@ class CoarseEncoders:
     def coarsest(self) -> Array:
         """Largest encoder steps that the recorded motion can simulate, shape (n,), rad or m.
 
-        The motion of the encoder contains LIMIT.LINES_IN_MOTION steps of this size; inf for an
-        encoder at rest.
+        The motion of the encoder contains at least a few steps of this size (LINES_IN_MOTION of the
+        limits); inf for an encoder at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)
@@ -142,8 +142,9 @@ class CoarseEncoders:
     def finest(self) -> float:
         """Smallest encoder step that can be simulated with the recorded positions, rad or m.
 
-        The step is LIMIT.EXACT_FROM times the largest step of the encoders that made the records,
-        so that the recorded positions are exact in comparison; 0 if those encoders are unknown.
+        The step is several times (EXACT_FROM in limits.toml) the largest step of the encoders that
+        made the records, so that the recorded positions are exact in comparison; 0 if those
+        encoders are unknown.
         """
         own = (part.record.own for part in self.parts)
         steps = (float(encoder.step.max()) for encoder in own if encoder is not None)
@@ -170,9 +171,10 @@ class CoarseEncoders:
 
         delta : steps of the encoders, shape (m,).
 
-        Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2.
-        After sampling, it is as slow as its distance from a multiple of the rate. If a joint keeps
-        a speed that is a simple fraction of a step per sample, the error is constant.
+        Harmonic h of the error of a count has the frequency h |qd|/Delta and a power proportional
+        to 1/h^2. After sampling, its frequency is the distance from h |qd|/Delta to the nearest
+        multiple of the rate. If a joint keeps a speed that is a simple fraction of a step per
+        sample, the error is constant.
         """
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))

@@ -11,11 +11,12 @@ W_qdi dqd_i + W_qddi dqdd_i + second order. Over the rows t of joint j that are 
 
     E[W_c' W_c] = W'W + E[dW'dW] + W'E[dW] + E[dW]'W          E[W_c' Y] = W'Y + E[dW]'Y
 
-Decimation filters the products S(t) e(t). S varies with the motion, the errors with the filters'
-cut-off, ten times faster by the rule of the chapter. So S is assumed to be constant over one
-impulse response, while the correlation of the errors in time is exact. Sensitivities are central
-differences of the generated regressor along the principal axes of C_0, at the kept instants alone.
-For columns that switch with the sign of a speed, see `runtime.advisor.sign_errors`.
+Decimation filters the products S(t) e(t). S varies as fast as the motion; the errors vary as fast
+as the cut-off of the filters allows, which is ten times faster by the rule of the chapter. So S is
+assumed to be constant over one impulse response, while the correlation of the errors in time is
+exact. Sensitivities are central differences of the generated regressor along the principal axes of
+C_0, at the kept instants alone. For columns that switch with the sign of a speed, see
+`runtime.advisor.sign_errors`.
 """
 
 from __future__ import annotations
@@ -150,7 +151,7 @@ class Perturbation:
 
 
 def value_reader(reader: Reader) -> Reader:
-    """Return a reader that uses positions as they are: the given one if it does, or the low-pass."""
+    """Return the given reader if it uses positions as they are, otherwise the low-pass."""
     return reader if reader.filters_positions else LOWPASS
 
 

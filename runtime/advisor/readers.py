@@ -2,10 +2,11 @@
 
 The change of the estimate is computed along steps of law phase, for both readers
 (`runtime.advisor.coarse_encoders`). White noise does not describe a sawtooth that is locked to the
-motion, still less what a reader of counts leaves of it. So no first-order law is used: each point
-of the curve is a mean over phases of the encoder (a quadrature). Limits are the steps at which the
-curve crosses 1 % and 5 %. At the steps on either side, the number of phases is doubled until the
-limit is certain to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limits.
+motion, and still less the error that a reader of counts leaves. So no first-order law is used: each
+point of the curve is a mean over phases of the encoder (a quadrature). Limits are the steps at
+which the curve crosses 1 % and 5 %. At the steps on either side, the number of phases is doubled
+until the limit is certain (CURVE_SHARPNESS in limits.toml). Runs of random phase confirm the
+limits.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def encoder_readers(listed: Mapping[str, Reader], own: str) -> dict[str, Reader]
 def readers_in_words(readers: Mapping[str, Reader]) -> dict[str, str]:
     """Say of each reader what it reads positions as: "positions" or "counts".
 
-    The name of the reader is added if another one reads them as the same.
+    The name of the reader is added if another reader gives the same word.
     """
     read_as = {
         name: "positions" if reader.motion is None else "counts" for name, reader in readers.items()
@@ -146,7 +147,7 @@ def curves(
 class ReadSteps:
     """Store of the estimates X with coarse encoders, by group of encoders and by step.
 
-    The step of exponent k is start*LIMIT.READER_RATIO^k.
+    The step of exponent k is start r^k, with the ratio r = READER_RATIO in limits.toml.
 
     Attributes
     ----------
@@ -155,7 +156,7 @@ class ReadSteps:
         Numbers of the encoders of each group, by label.
     start : float, rad or m
     reference : Estimate
-        Of the records as measured; it says which parameters decide, and by which changes.
+        Estimate from the records as measured, with the parameters that decide.
     ratios : dict
         By label and exponent k: estimates at the phases of the encoders over the exact estimate,
         shape (phases, b).
@@ -177,8 +178,8 @@ class ReadSteps:
     def read(self, k: float, labels: Iterable[str], more: int = 0) -> list[str]:
         """Store the estimates of some groups at the step of exponent k.
 
-        They are those at the first phases of the encoders, or at `more` further phases. Return the
-        labels of the groups for which the step can be simulated and read.
+        The estimates are those at the first phases of the encoders, or at `more` further phases.
+        Return the labels of the groups for which the step can be simulated and read.
         """
         real, delta = self.real, self.start * LIMIT.READER_RATIO**k
         coarsest = real.coarsest
@@ -254,9 +255,9 @@ def read_locked_steps(steps: ReadSteps) -> None:
 
 
 def read_vague_steps(steps: ReadSteps) -> None:
-    """Double the phases at the steps beside the limits, until the limits are certain.
+    """Double the phases at the steps next to the limits, until the limits are certain.
 
-    A curve that ends below the last limit then goes on.
+    If a curve ends below the last limit, coarser steps are then read.
     """
     exhausted = set[tuple[str, float]]()  # steps at which no more phases can be read
     while vague := vague_groups(steps, exhausted):
@@ -285,7 +286,9 @@ def vague_groups(
 
 
 def read_on(steps: ReadSteps, label: str, k: float) -> None:
-    """Read steps above exponent k, if k is the last one of a group and below the last limit."""
+    """Read steps above exponent k, if k is the last exponent of a group and the curve is still
+    below the last limit.
+    """
     while (
         k == max(steps.ratios[label])
         and steps.worst(label, k) < LIMITS[-1]
@@ -301,8 +304,9 @@ def vague_steps(
     limiting step, the weighed change of X is `limit`, for instance 1.
 
     The limiting step is between two steps. A step is returned if the standard deviation of its
-    change moves the limiting step by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on
-    logarithmic axes. If even the finest step is above the limit, only this step is judged.
+    change moves the limiting step by more than a small share (CURVE_SHARPNESS in limits.toml), by
+    straight lines on logarithmic axes. If even the finest step is above the limit, only this step
+    is judged.
 
     changes : weighed change and its standard deviation, shape (2, b), by exponent of the step,
         ascending.

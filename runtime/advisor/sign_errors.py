@@ -2,7 +2,7 @@
 
 Columns of sign(s), s = G qd, have no derivative. Let s be known up to a normal error of standard
 deviation sigma (filters add many raw errors, so it is normal whatever their law), u = s/sigma, phi
-and erf of the normal law, He_n Hermite's polynomials:
+the normal density, erf the error function, and He_n Hermite's polynomials:
 
     E sign(s + sigma z) = erf(u/sqrt 2)
         c_n = E[sign(s + sigma z) He_n(z)] = 2 phi(u) He_(n-1)(-u)
@@ -55,7 +55,8 @@ class Switched:
     slope : c_1/sigma at the kept instants, shape (K,); it replaces the derivative.
     variance : sum of Var f after decimation over the rows used of each joint, shape (n,).
 
-    All values are for G_j = 1.
+    Here f is the column, c_1 its first Hermite coefficient (see above), and all values are for s =
+    qd_j.
     """
 
     sigma: float
@@ -66,9 +67,9 @@ class Switched:
     def between(self, other: Switched, sigma: float) -> Switched:
         """Interpolate the effect of velocity errors, given for two standard deviations of errors.
 
-        The interpolated quantities are shift, slope*sigma and variance/sigma. This is exact if the
-        speed rests (slope as 1/sigma, variance as sigma) or passes zero quickly (slope constant,
-        variance as sigma^2).
+        The interpolated quantities are shift, slope*sigma and variance/sigma. The interpolation is
+        exact if the speed rests (slope proportional to 1/sigma, variance to sigma) or passes zero
+        quickly (slope constant, variance proportional to sigma^2).
         """
         share = (sigma - self.sigma) / (other.sigma - self.sigma)
         here = (self.shift, self.slope * self.sigma, self.variance / self.sigma)
@@ -119,9 +120,9 @@ def switch_with_error(
 def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) -> Array:
     """Compute the Hermite coefficients of a column of W that switches sign, such as sign(qd).
 
-    Return c_n/sqrt(n!) of order n = 1 ... ORDERS and one more row, shape (ORDERS + 1, len(u)). This
-    row is for all higher orders: the square root of the variance they contribute, with the sign of
-    the next coefficient.
+    Return c_n/sqrt(n!) of the orders n = 1 ... N and one more row, shape (N + 1, len(u)), with N =
+    `ORDERS`. The last row is for all higher orders: the square root of the variance they
+    contribute, with the sign of the next coefficient.
     """
     He = [np.ones_like(u), -u]
     for n in range(1, ORDERS):
@@ -145,8 +146,8 @@ class Kernels:
     They are those of rho_k^n r_k, with rho_k the correlation of velocity errors k samples apart,
     and r_k the same for the decimation filter.
 
-    spectra : transforms for n = 1 ... ORDERS + 1, shape (ORDERS + 1, length//2 + 1). Frequencies
-        between 0 and the Nyquist frequency count twice.
+    spectra : transforms for n = 1 ... N + 1 with N = `ORDERS`, shape (N + 1, length//2 + 1).
+        Frequencies between 0 and the Nyquist frequency count twice.
     bin, bins, length : there are `bins` sums of `bin` samples each, padded with zeros to `length`.
     """
 
@@ -183,7 +184,8 @@ def _summed_variance(coefficients: Array, near: Array, known: Kernels) -> float:
     It is the sum of c_n(t) c_n(t') rho^n r over all orders n and instants t, t', by Parseval's
     theorem.
 
-    coefficients : c_n/sqrt(n!) at the samples `near`, shape (ORDERS + 1, len(near)).
+    coefficients : c_n/sqrt(n!) at the samples `near`, of N = `ORDERS` orders and one more,
+        shape (N + 1, len(near)).
     """
     sums = np.array(
         [np.bincount(near // known.bin, weights=c, minlength=known.bins) for c in coefficients]

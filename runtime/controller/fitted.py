@@ -116,7 +116,7 @@ def law_of_controller(problem: Problem) -> Problem:
 
 
 class FittedLaw(Part):
-    """Part that tells what was fitted of the control law, ahead of the values of the parameters."""
+    """Part on the fitted values of the control law, printed before the values of the parameters."""
 
     name = "law_of_controller"
     title = "Law of the controller"
@@ -126,7 +126,7 @@ class FittedLaw(Part):
         self.estimate = estimate
 
     def checks(self) -> tuple[Check, ...]:
-        """Return one check, which is good: the fitted gains and the fitted delay."""
+        """Return one check, always good, whose text gives the fitted gains and the fitted delay."""
         finding = self.estimate.text.rstrip(".")
         question = "What was fitted of the law of the controller?"
         return (Check(question, "good", finding, ahead=True),)
@@ -184,9 +184,10 @@ class UnsignedModel:
 
 
 def doubt_of_gains(result: Identification) -> Doubt | None:
-    """Return a warning if the records fit much better with other velocity gains than the given.
+    """Return a warning if the records fit much better with other velocity gains than the given
+    ones.
 
-    None if there is no such doubt.
+    The result is None if there is no such doubt.
     """
     sentence = gain_doubt(result.problem, result.estimate.relative_error)
     return Doubt("gain_doubt", "Law of the controller", sentence) if sentence else None
@@ -195,8 +196,8 @@ def doubt_of_gains(result: Identification) -> Doubt | None:
 def gain_doubt(problem: Problem, error: float) -> str:
     """Write a warning if the records fit much better with other velocity gains kd than the given.
 
-    The warning is written if another kd more than halves the error. Otherwise the text is "", also
-    if the records do not use the torque of the law.
+    The warning is written if another kd more than halves the error. Otherwise the text is "". It is
+    "" as well if the torques of the records do not come from the control law.
 
     error : relative error of the torque with the stated kd, %.
     """
@@ -326,7 +327,7 @@ def _best(
     delay: float,
     cuts: bool,
 ) -> tuple[Array, float, float]:
-    """Search kd and delay from several kd; return those of the smallest misfit, and the misfit."""
+    """Search for kd and delay from several kd; return those of the smallest misfit, and the misfit."""
     ends = [_search_kd(torques, gains, late_too, kd, delay, cuts) for kd in starts]
     return min(ends, key=lambda end: end[2])
 
@@ -339,7 +340,7 @@ def _search_kd(
     delay: float,
     cuts: bool,
 ) -> tuple[Array, float, float]:
-    """Search velocity gains kd and delay by Gauss-Newton iterations from given kd and delay.
+    """Search for velocity gains kd and delay by Gauss-Newton iterations from given kd and delay.
 
     Returns kd, the delay and their misfit, which is nan if the drives do not cut.
 
@@ -455,7 +456,7 @@ def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Arr
 def _apart(fit: Estimate, name: str) -> bool:
     """Whether the gain `name` can be distinguished from every other parameter of the fit.
 
-    Its correlations with the others must be below LIMIT.KD_ALIKE.
+    Its correlations with the other parameters must be small (below KD_ALIKE in limits.toml).
     """
     k = fit.names.index(name)
     scale = np.sqrt(np.diag(fit.covariance))

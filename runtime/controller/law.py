@@ -4,9 +4,10 @@ Many legged robots log only q, the reference and the gains.
 
     tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
 
-P, Vr, Vm of `runtime.loop.settings.Law`, joint side, SI; qd as recorded, else differences
-q_k - q_(k-1) over the period. With kd: fit, the part of kd is left out and the torque is not cut
-yet: kd is estimated with the parameters, with the saturation (`runtime.controller.fitted`).
+P, Vr and Vm are the gains of `runtime.loop.settings.Law` on the joint side, in SI. qd is the
+recorded velocity or, without one, the difference q_k - q_(k-1) over the period. With kd: fit, the
+torque of kd is left out and the sum is not cut at the saturation: `runtime.controller.fitted`
+estimates kd together with the parameters, and cuts then.
 """
 
 from __future__ import annotations
@@ -98,7 +99,8 @@ def late(t: Array, x: Array, delay: float) -> Array:
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
     """Make the control law that gives the torques of n joints from the controller settings.
 
-    SettingsError for gains that need more than the recorded signals, such as that of an integral.
+    Raise SettingsError for gains that need more than the recorded signals, such as that of an
+    integral.
 
     limits : limits of the robot file.
     """

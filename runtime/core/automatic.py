@@ -1,8 +1,9 @@
 """Replacement of the setting `signals.lowpass.cutoff: auto` by cut-off frequencies in Hz.
 
 Each fitted record gets the cut-off that it would have alone, since its rate and the noise of its
-positions are its own. The study gets the cut-off of all these records together: it stands for a
-record that is too short or does not move, and is the highest for a record that is predicted.
+positions are its own. The study gets the cut-off of all these records together. This cut-off is
+used for a record that is too short or does not move, and is the upper limit for a record that is
+predicted.
 
 Contacts shake a robot at all frequencies. Near the cut-off, the filter takes part of this motion from
 W and not from Y, which biases the parameters. So `decimate.factor: auto` keeps every third row of eq.
@@ -25,10 +26,6 @@ from runtime.core.signals.cutoff import Choice, chosen_cutoff, lines_of
 from runtime.core.signals.filters import decimation_factor
 from runtime.ground.limits import LIMIT
 
-FEWER = 3
-"""Rows of eq. (13) of which one is kept where contacts shake the robot."""
-ROWS_PER_PARAMETER = 20
-"""Rows of a parameter that are kept at least, as far as eq. (13) keeps them."""
 NAMED = 3
 """Records with the same cut-off that are named; more are counted."""
 
@@ -89,9 +86,9 @@ def _below_the_filter(problem: Problem) -> Problem:
         for record in records or problem.unseen
     ]
     rows = sum(len(record) * record.n for record in records)
-    most = int(rows / (ROWS_PER_PARAMETER * len(problem.model.BASE_PARAMETERS)))
+    most = int(rows / (LIMIT.CONTACT_ROWS * len(problem.model.BASE_PARAMETERS)))
     factor = max(factors, default=1)
-    decimate = replace(how, factor=max(factor, min(FEWER * factor, most)))
+    decimate = replace(how, factor=max(factor, min(LIMIT.CONTACT_THINNING * factor, most)))
     settings = replace(problem.settings, signals=replace(signals, decimate=decimate))
     return problem.changed(settings=settings)
 

@@ -11,9 +11,9 @@ and the base of a free robot is moved by
 
     sum (R F, R N + P x R F) ,
 
-the force and the moment about the origin of frame 0 in its axes. These six are the torques of six
-more joints that stay at zero, FX0 .. NZ0, after the others. So all that is known of axes of force
-sensors (`runtime.wrench`) holds for them.
+the force and the moment about the origin of frame 0 in its axes. The model treats these six numbers
+as the torques of six more joints, FX0 .. NZ0, that stay at zero and follow the other joints. So all
+rules for axes of force sensors (`runtime.wrench`) hold for the six joints.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def with_axes(record: Record, wrenches: Sequence[Array], tau: Array | None = Non
 
 
 def settings_of_axes(settings: Study, n: int, axes: int, torques: bool, methods: Methods) -> Study:
-    """Return the settings of n joints with so many axes of wrenches after them.
+    """Return the settings of a problem whose n joints are followed by axes of wrenches.
 
     Without measured torques, joints give no rows. If the method is ols, it becomes wls with a
     weight for each joint and axis, because N and N m cannot be added.
@@ -90,7 +90,8 @@ def on_links(problem: Problem) -> dict[str, Any]:
     """Take the wrenches of the world on the links into the torques of the records.
 
     The robot of the problem has a base that moves or is free. Return what changes of the problem by
-    field: records, unseen records and settings; nothing without wrenches on a base that only moves.
+    field: records, unseen records and settings; an empty mapping if no wrench acts on a robot whose
+    base only moves.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def on_links(problem: Problem) -> dict[str, Any]:
     torques = any(record.tau.any() for record in problem.records)
     if problem.records and not torques and not any(map(_acts, problem.records)):
         raise InputError(
-            "all torques and all wrenches are zero, so that no row tells a parameter; give the "
+            "all torques and all wrenches are zero, so that no row determines a parameter; give the "
             "joint torques (record.columns.tau), or the wrench of the world"
         )
     changed: dict[str, Any] = {

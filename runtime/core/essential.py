@@ -164,7 +164,7 @@ def _removals(steps: Sequence[Removal], threshold: float) -> int:
 def _trail(system: System, threshold: float) -> list[Removal]:
     """Remove the parameter with the largest %sigma, fit again, and repeat; return these removals.
 
-    They end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
+    The removals end when the ratio of sigma_rho to its first value reaches `threshold`, or with one
     parameter left. A Removal has %sigma before the removal and the ratio after the removal.
     """
     steps: list[Removal] = []

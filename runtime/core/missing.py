@@ -27,11 +27,11 @@ class Missing:
     Attributes
     ----------
     samples : ndarray of bool, shape (N, n)
-        True: the column has no position at this sample. The record holds there a straight line
+        True: the column has no position at this sample. The record then contains a straight line
         between the neighbouring positions.
     follows : ndarray of bool, shape (n, n), or None
-        True: the position of joint j depends on column i, because R^-1 of the drives is not zero
-        there. None: the columns are joints.
+        True: the position of joint j depends on column i, because this entry of R^-1 of the drives
+        is not zero. None: the columns are joints.
     """
 
     samples: Array
@@ -55,8 +55,8 @@ class Missing:
     def near_gaps(self, longest: int, reach: int) -> Array:
         """Return a mask of the samples in or near long runs of missing positions, bool, shape (N,).
 
-        A gap is long if it has more than `longest` samples; near means at most `reach` samples
-        away.
+        A gap is long if it has more than `longest` samples; a sample is near if it is at most
+        `reach` samples away.
         """
         ends = np.flatnonzero(
             np.diff(self.at_joints().any(axis=1), prepend=False, append=False)

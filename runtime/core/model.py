@@ -162,9 +162,9 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
 
     An emitted module is sent as its text, as it was loaded.
 
-    The receiving process trusts the sending one. Any other module is imported by its name. Raise
-    InputError for an emitted module without a file, and for one that was imported from a file that
-    has changed since: the docstring has the hash of the text.
+    The receiving process trusts the sending process. Any other module is imported by its name.
+    Raise InputError for an emitted module without a file, and for an emitted module whose file has
+    changed since its import: the docstring has the hash of the text.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -181,7 +181,9 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
 
 
 def _text_as_loaded(file: Path, module: ModuleType) -> str:
-    """Read the text of a module that Python has imported from a file; InputError if it changed."""
+    """Read the text of a module that Python has imported from a file; raise InputError if the file
+    has changed.
+    """
     try:
         text = file.read_text(encoding="utf-8")
         same = ast.get_docstring(ast.parse(text), clean=False) == module.__doc__
@@ -245,9 +247,9 @@ def checked_model(module: ModuleType) -> GeneratedModel:
 
 
 def base_rows(model: GeneratedModel) -> tuple[str, ...]:
-    """Return the names of the rows that an emitted model has before its joints: of a free base.
+    """Return the names of the rows of a free base, which an emitted model has before its joints.
 
-    They are the force on frame 0, then the moment about its origin, in its axes.
+    The rows are the force on frame 0, then the moment about its origin, in the axes of frame 0.
     """
     free = getattr(model, "BASE", "fixed") == "free"
     return ("FX0", "FY0", "FZ0", "NX0", "NY0", "NZ0") if free else ()
@@ -310,28 +312,19 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
         )
 
 
-def require_no_wrench(model: GeneratedModel, what: str) -> None:
-    """Raise InputError if the model has axes of force sensors, which no motor moves.
+def require_no_axes(model: GeneratedModel, what: str) -> None:
+    """Raise InputError if the model has axes that no motor moves: force sensors, or a free base.
 
-    what : name of the caller, which plans motions of joints.
-    """
-    if any(is_axis(joint) for joint in model.JOINTS):
-        raise InputError(
-            f"{what} does not support force sensors; remove record.columns.wrench from the study, or "
-            "the channels wrench0 ... from the records"
-        )
-
-
-def axes_of(model: GeneratedModel) -> tuple[str, str] | None:
-    """Return what gives a model axes that no motor moves, and how a study does without it.
-
-    None: the model has no such axes.
+    what : name of the caller.
     """
     if not any(is_axis(joint) for joint in model.JOINTS):
-        return None
+        return
     if base_rows(model):
-        return "a free base", "with --base moving"
-    return "force sensors", "without record.columns.wrench"
+        raise InputError(f"{what} does not support a free base; use the robot with --base moving")
+    raise InputError(
+        f"{what} does not support force sensors; remove record.columns.wrench from the study, or the "
+        "channels wrench0 ... from the records"
+    )
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
@@ -357,8 +350,9 @@ def is_axis(joint: int | str) -> bool:
 def is_form(acts: Mapping[Any, float]) -> bool:
     """Whether an element on the joints, such as a spring, is given by a quadratic form q'Bq.
 
-    Other elements act along a combination s = G q of joints. acts : coefficients of the element, by
-    joint; in a quadratic form by pair of joints.
+    Other elements act along a combination s = G q of joints.
+
+    acts : coefficients of the element, one for each joint or, for a form, for each pair of joints.
     """
     return any(isinstance(key, tuple) for key in acts)
 
@@ -380,7 +374,7 @@ def elements_of(
     Raises
     ------
     ModelError
-        A model of an older version, without this table.
+        The model is of an older version, without this table.
     """
     table = "elements" if constants else "ELEMENTS"
     if not hasattr(model, table):
@@ -537,7 +531,7 @@ class BoundModel:
     model : GeneratedModel
         An emitted module.
     constants : mapping of str to float
-        New values of some of its CONSTANTS, by name.
+        New values of some constants of the module, by name.
     """
 
     def __init__(self, model: GeneratedModel, constants: Mapping[str, float]) -> None:

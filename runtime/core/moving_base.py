@@ -4,10 +4,11 @@ An emitted model of such a robot takes the motion of the base before the states 
 
     Gamma = D(base, q, qd, qdd) X ,     base = (w0, wd0, a0) ,
 
-while an identification knows states of joints, and channels: signals that a record gives at each
-sample. `MovingModel` makes the nine components of the base channels of the model, so that every
-analysis that supports channels supports a base that moves. The six rows of a free base are those of
-six more joints, which stand after the others and stay at zero (`runtime.core.contacts`).
+while an identification knows only states of joints and channels, which are signals that a record
+gives at each sample. `MovingModel` makes the nine components of the base channels of the model, so
+that every analysis that supports channels supports a base that moves. The six rows of a free base
+become the rows of six more joints, which follow the other joints and stay at zero
+(`runtime.core.contacts`).
 """
 
 from __future__ import annotations
@@ -105,9 +106,9 @@ def moved_base(problem: Problem) -> Problem:
     Raises
     ------
     InputError
-        A record without the motion of the base of such a robot, or with that of a fixed base; a
-        quaternion that is not of unit length; a pose of the base with poses at rest; wrenches on
-        links as `on_links` refuses them.
+        A record of such a robot has no motion of the base, or a record of a fixed base has one; a
+        quaternion is not of unit length; a pose of the base is given with poses at rest; or
+        `on_links` refuses the wrenches on links.
     """
     model, records = problem.model, (*problem.records, *problem.unseen)
     if isinstance(model, MovingModel):

@@ -6,13 +6,13 @@
     all          least squares
 
 The feasible set is used and is printed first, unless all parameters predict unseen data better by
-more than LIMIT.PREFERRED_SET. Unseen data are the validation records. Without them, they are the
-second half of the record, and also the fifths of `held_out_validation`: half a record may not
-determine friction, if a joint moves one way only. Then both sets fail on the other half, and their
-order means nothing. The feasible set needs semidefinite programs: it is fitted only if it may be
-used (`physical_asked`), or if the essential set is used and a program needs all parameters. The
-weight of its prior and its bounds by reach are found from all rows; fits of parts of the rows then
-use these values.
+more than 5 % (PREFERRED_SET in limits.toml). Unseen data are the validation records. Without them,
+they are the second half of the record, and also the fifths of `held_out_validation`: half a record
+may not determine friction, if a joint moves in one direction only. Both sets then fail on the other
+half, and their order means nothing. The feasible set needs semidefinite programs: it is fitted only
+if it may be used (`physical_asked`), or if the essential set is used and a program needs all
+parameters. The weight of its prior and its bounds by reach are found from all rows; fits of parts
+of the rows then use these values.
 
 The essential set shows which parameters explain the torques. Its standard deviations assume that
 the removed parameters are zero, but their true values bias the others: 95 % intervals hold 67 to 74
@@ -53,7 +53,7 @@ class Sets(Mapping[SetName, Estimate]):
         whole    which set has a value for every column?    `whole_set`: robot files, programs
 
     As a mapping it has the sets that were fitted, by name; it is empty if the method is not linear.
-    Then all parameters, by this method, answer both questions.
+    In that case the set of all parameters, by the method of the study, answers both questions.
 
     Attributes
     ----------
@@ -106,9 +106,9 @@ class Sets(Mapping[SetName, Estimate]):
         return whole_set(self, self.used) if self else "all"
 
     def wider(self, moves: Mapping[str, float]) -> Sets:
-        """Return the sets with deviations sqrt(s^2 + dX^2), s those of now.
+        """Return the sets with deviations sqrt(s^2 + dX^2), s being the present deviations.
 
-        moves : dX by parameter, SI, what the parameter moves by if the model had what it lacks.
+        moves : change dX of each parameter, SI, if the model had what it lacks.
         """
 
         def own(fit: Estimate) -> Estimate:
@@ -123,7 +123,9 @@ class Sets(Mapping[SetName, Estimate]):
         )
 
     def estimate(self, name: SetName) -> Estimate:
-        """Return the estimate of one set; that of all parameters if the method is not linear."""
+        """Return the estimate of one set; if the method is not linear, return that of all
+        parameters.
+        """
         return self.get(name, self.all)
 
 
@@ -182,8 +184,8 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
     """Return the name of the set of parameters with the smallest error on unseen data.
 
     errors : by set, %. essential : whether the essential set may be used. A smaller set is
-    preferred if its error is nearly the smallest (LIMIT.PREFERRED_SET). Without known errors:
-    "essential" if it may be used, else "all".
+      preferred if its error is nearly the smallest (within PREFERRED_SET in limits.toml). Without
+      known errors, the result is "essential" if that set may be used, else "all".
     """
     candidates = ORDER if essential else ORDER[1:]
     known = {name: errors[name] for name in candidates if np.isfinite(errors.get(name, np.nan))}
@@ -196,8 +198,8 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
 def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
     """Return the name of the set of parameters to use where every base parameter needs a value.
 
-    A robot file, for instance, needs all of them. The set is the one in use, `model_columns`; if
-    that is the essential set, the physical one, or "all" if `names` has no physical set.
+    A robot file, for instance, needs all of them. The result is the set in use or, if that is the
+    essential set, the physical set ("all" if `names` has no physical set).
     """
     if model_columns != "essential":
         return model_columns
@@ -223,9 +225,9 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 def physical_method(problem: Problem, fit: Estimate) -> str | None:
     """Return the name of the method that fits the physical set after the fit of all parameters.
 
-    None if that is not possible: it needs such a method, a linear method of the study, a fit with
-    status ok that has every inertial base parameter (friction and other elements may be left out),
-    and weights other than "covariance".
+    Return None if the fit is not possible: it needs such a method, a linear method of the study, a
+    fit with status ok that has every inertial base parameter (friction and other elements may be
+    left out), and weights other than "covariance".
     """
     settings, needed = problem.settings.estimate, {*problem.model.BASE_PARAMETERS}
     if settings.columns != "all":
@@ -239,9 +241,9 @@ def physical_method(problem: Problem, fit: Estimate) -> str | None:
 def with_physical(problem: Problem, observation: Observation, sets: Sets) -> tuple[Sets, str]:
     """Fit physically consistent parameters to all rows, if possible, and add them to the sets.
 
-    The settings of the set are for later fits to parts of the rows: they fix the prior, its weight
-    and the bounds by reach as found from all rows. Return the sets, and a sentence if the fit
-    failed.
+    The settings stored with the set are for later fits to parts of the rows: they fix the prior,
+    its weight and the bounds by reach at the values found from all rows. Return the sets, and a
+    sentence if the fit failed.
     """
     name = physical_method(problem, sets.all)
     if name is None:
@@ -280,13 +282,12 @@ def held_out_validation(
 ) -> CrossValidation:
     """Divide the record into equal parts, and predict each part by a fit of the other parts.
 
-    The number of parts is LIMIT.HELD_OUT_PARTS.
+    The record has five parts (HELD_OUT_PARTS in limits.toml).
     """
-    number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
-    for p in np.unique(number):
-        part = observation.where(number == p)
+    folds = []
+    for rest, part in observation.folds(LIMIT.HELD_OUT_PARTS):
         label = f"[{', '.join(map(instant, part.span))}] s"
-        rest, name = observation.where(number != p), f"all but {label}"
+        name = f"all but {label}"
         folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
     predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
     missing = tuple(text for fold in folds for text in fold.missing)
@@ -350,8 +351,8 @@ def validated(
 
     Return three values: the sets with their errors, and with the physical set if it may be used;
     the predictions; and sentences on the predictions or fits that failed. Fifths of the records are
-    used if their halves prefer all parameters to the physical ones. Nothing is predicted if a
-    nonlinear method did not converge, because each prediction would simulate a wrong loop.
+    used if halves of the records prefer all parameters to the physical set. Nothing is predicted if
+    a nonlinear method did not converge, because each prediction would simulate a wrong loop.
     """
     study = problem.settings
     status = sets.all.status
@@ -376,7 +377,7 @@ def validated(
 
 
 def _errors(validation: Sequence[CrossValidation]) -> dict[SetName, float]:
-    """Return the error of each set on the last data that it predicts, %, in the order of ORDER."""
+    """Return the error of each set (essential, feasible, all) on the last data it predicts, %."""
     errors = validation[-1].errors() if validation else {}
     return {name: errors[name] for name in ORDER if name in errors}
 
@@ -391,8 +392,8 @@ def _validation(
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
     """Predict other time windows, then other records, with every set of parameters.
 
-    Between windows, the sets `choices` are fitted again; on further records the estimates `known`,
-    from all rows, are used. Return the validations, and sentences on those that failed.
+    The sets `choices` are fitted again to the first window; further records are predicted with the
+    estimates `known`, from all rows. Return the validations, and sentences on those that failed.
     """
     validation, missing = [], []
     try:

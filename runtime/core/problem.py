@@ -4,8 +4,8 @@
     rows = observe_rows(problem)
     fit  = estimated(problem, rows)               eqs. (6) to (11) of the chapter
 
-A Step changes the problem before rows are made of it. Every analysis starts from a prepared
-problem, so that all analyses use the same model, rows and torques.
+A Step changes the problem before its rows are made. Every analysis starts from a prepared problem,
+so that all analyses use the same model, rows and torques.
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ class Problem:
     def reading(self, record: Record) -> Prepared:
         """Combine a record with settings and reader into a Prepared, which computes q, qd, qdd.
 
-        A record without drives gets those of the model. A record with a cut-off of its own is
-        filtered with it.
+        A record without drives gets those of the model. If a record has a cut-off of its own, this
+        cut-off is used.
         """
         drives = drives_of(self.model)
         if record.origin.drives is None and drives is not None:
@@ -130,8 +130,8 @@ class Problem:
     def linear_system(self, rows: Observation, **changes: Any) -> System:
         """Weigh the rows Y = W X + rho for linear least squares with the weights of the settings.
 
-        It is the system of the method, or of its companion if the method is not linear. changes :
-        other values of settings.estimate, such as columns.
+        The result is the system of the method or, if the method is not linear, of its companion.
+        changes : other values of settings.estimate, such as columns.
         """
         settings = self.settings.estimate
         return linear_system(
@@ -265,7 +265,7 @@ def estimate_of(
     provenance : mapping, optional
         Further entries for Estimate.provenance (a seed, the study file).
     corrected : bool
-        Whether to compute `sigma_corrected`; without it, nan, for a fit of which only X is used.
+        Whether to compute `sigma_corrected`; False, for a fit of which only X is used, leaves nan.
     """
     method = method_of(settings, methods)
     system = method.system(observation, settings)
@@ -297,7 +297,7 @@ def estimate_of(
 def point_estimate(settings: EstimateSettings, methods: Methods) -> EstimateSettings:
     """Return settings for a faster fit that gives X only, without explanations for the user.
 
-    Methods that have no such options use the settings unchanged.
+    Settings of a method without options for this purpose stay unchanged.
     """
     brief = method_of(settings, methods).brief
     return replace(settings, options={**settings.options, **brief}) if brief else settings

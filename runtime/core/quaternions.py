@@ -12,7 +12,7 @@ UPRIGHT = 1e-9  # cosine of a pitch at which roll and yaw are about one axis
 
 
 def continued(Q: Array) -> Array:
-    """Return the quaternions Q, shape (N, 4), with signs that make them continuous."""
+    """Return the quaternions Q, shape (N, 4), with the signs that make their components continuous."""
     turned = np.where(np.einsum("tk,tk->t", Q[1:], Q[:-1]) < 0, -1.0, 1.0)
     return np.asarray(Q * np.concatenate([[1.0], np.cumprod(turned)])[:, None])
 

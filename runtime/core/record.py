@@ -72,9 +72,9 @@ class Origin:
         Whether the torque was computed by the law of a controller.
     sides : (str, str) or None
         Sides of the gears at which positions and torques were measured, each "motor", "joint" or
-        "link" (behind the gears); None: not told, so that those of the study count.
+        "link" (behind the gears); None: unknown, so that the sides of the study are used.
     cutoff : float or None, Hz
-        Cut-off of the low-pass for this record, where it is not that of the study
+        Cut-off of the low-pass for this record, if it differs from the cut-off of the study
         (`runtime.core.automatic`).
     """
 
@@ -197,7 +197,9 @@ class Record:
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Sides of the gears at which positions and torques were measured; joint if not told."""
+        """Sides of the gears at which positions and torques were measured; "joint" if the record
+        does not state them.
+        """
         return self.origin.sides or ("joint", "joint")
 
     @property
@@ -224,7 +226,9 @@ class Record:
         return replace(self, q=q, channels=others, **changes)
 
     def cut_at(self, hertz: float | None) -> Record:
-        """Return the record with the cut-off of its own low-pass, Hz; None: that of the study."""
+        """Return the record with a cut-off of its own for the low-pass, Hz; None: the cut-off of
+        the study.
+        """
         if self.origin.cutoff == hertz:
             return self
         return replace(self, origin=replace(self.origin, cutoff=hertz))
@@ -272,7 +276,7 @@ def _require_known(named: Mapping[str, Any]) -> None:
 def _signals(given: Mapping[str, ArrayLike | None], file: str) -> dict[str, Array]:
     """Convert t, q, tau and tau_known to arrays of the shapes (N,) and (N, n).
 
-    tau_known is left out if it is None. InputError if the shapes differ.
+    tau_known is left out if it is None. Raise InputError if the shapes differ.
     """
     arrays = {
         label: _array(x, label, file)
@@ -287,9 +291,10 @@ def _signals(given: Mapping[str, ArrayLike | None], file: str) -> dict[str, Arra
 def _require_shapes(
     signals: Mapping[str, Array], shapes: Mapping[str, tuple[int, ...]], file: str
 ) -> None:
-    """Raise InputError unless t, q, tau and tau_known have the same N samples, enough of them.
+    """Raise InputError unless t, q, tau and tau_known have the same number N of samples, at least
+    10.
 
-    shapes : those that were given, for the message.
+    shapes : the given shapes, for the message.
     """
     t, q, tau = (signals[label] for label in ("t", "q", "tau"))
     if t.ndim != 1 or q.ndim != 2 or q.shape != tau.shape or len(q) != len(t):
@@ -324,7 +329,7 @@ def _require_numbers(label: str, x: Array, file: str) -> None:
 
 
 def _positive(rate: float | None, file: str) -> float | None:
-    """Return the rate, Hz, as a float; InputError unless it is positive. None stays None."""
+    """Return the rate, Hz, as a float; raise InputError unless it is positive. None stays None."""
     if rate is None:
         return None
     rate = real_number(rate, "rate", file)
@@ -342,7 +347,7 @@ def _array(x: ArrayLike | None, label: str, file: str) -> Array:
 def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
     """Check a channel (a further measured signal) of a record, and make it read-only.
 
-    shape : that of the positions, (N, n).
+    shape : shape of the positions, (N, n).
     """
     require_kind(label, str, "a name of channels", "a text")
     array = _array(x, label, file)
@@ -363,7 +368,7 @@ def _missing(
 ) -> Missing | None:
     """Convert marks of missing positions to an object Missing; None if no position is missing.
 
-    shape : that of the positions, (N, n).
+    shape : shape of the positions, (N, n).
     """
     if missing is None:
         return None
@@ -380,7 +385,9 @@ def _missing(
 
 
 def _marks(missing: Any, file: str) -> Array:
-    """Convert the marks of missing positions to an array; InputError for rows of unequal length."""
+    """Convert the marks of missing positions to an array; raise InputError for rows of unequal
+    length.
+    """
     try:
         return np.array(missing)
     except Exception as e:  # ragged
@@ -412,7 +419,8 @@ def require_finite(
     hint: str = "",
     largest: float = FINITE,
 ) -> Array:
-    """Return x, shape (N, k); InputError if a number of x is not finite or larger than `largest`.
+    """Return x, shape (N, k); raise InputError if a number of x is not finite or larger than
+    `largest`.
 
     row : function from a sample number to its place. hint : another remedy for nan.
     """

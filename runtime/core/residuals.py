@@ -4,7 +4,7 @@ Eqs. (9), (10) assume that the residuals of a joint are independent. With rho_k,
 at a distance of k rows,
 
     Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m
-            chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
+            chi^2 with m degrees of freedom if they are independent         Ljung and Box (1978)
     N_eff = N / (1 + 2 sum_k rho_k)
             number of independent rows that give a mean of the same accuracy; the sum ends
             before the first rho_k <= 0
@@ -151,7 +151,7 @@ def correlation(products: Array, pairs: Array) -> Array:
 def correlation_time(rho: Array) -> float:
     """Compute the correlation time, as a number of rows, from the autocorrelation rho_k.
 
-    It is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
+    The time is 1 + 2 sum_k rho_k; the sum ends before the first rho_k that is not positive.
     """
     end = np.flatnonzero(rho <= 0)
     return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
@@ -199,10 +199,12 @@ def _lagged_sums(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
     sums = np.zeros((2, longest))
     for rows in records:
         own = place[rows] - place[rows[0]]
-        grid = np.zeros((2, own[-1] + 1))
-        grid[:, own] = x[rows], np.ones(len(rows))
-        spectrum = np.abs(rfft(grid, length := next_fast_len(2 * grid.shape[1], real=True))) ** 2
-        sums[:, : grid.shape[1]] += irfft(spectrum, length)[:, : grid.shape[1]]
+        length = next_fast_len(2 * (own[-1] + 1), real=True)
+        for total, values in zip(sums, (x[rows], 1.0), strict=True):
+            grid = np.zeros(own[-1] + 1)
+            grid[own] = values
+            spectrum = rfft(grid, length)
+            total[: len(grid)] += irfft(np.square(np.abs(spectrum)), length)[: len(grid)]
     return sums[0], np.rint(sums[1])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -47,7 +47,7 @@ class Identification:
     observation : Observation
         Y = W X + rho of all records.
     sets : Sets
-        The essential, the feasible and all parameters; which set is used, which one is written
+        The essential, the feasible and all parameters; which set is used, and which set is written
         (`runtime.core.parameter_sets`). A mapping of the estimates by name; empty if the method of
         the study is not linear.
     essential : Essential
@@ -155,8 +155,9 @@ class Identification:
     def set_errors(self) -> Mapping[SetName, float]:
         """Relative error, %, of torques that each set of parameters predicts for unseen data.
 
-        The sets are "essential", "feasible" (the physical set) and "all". If several parts or records are
-        predicted, the error is the largest one. Empty if none is predicted.
+        The sets are "essential", "feasible" (the physical set) and "all". If several parts or
+        records are predicted, the largest error counts. The mapping is empty if nothing is
+        predicted.
         """
         return self.sets.errors
 
@@ -175,7 +176,7 @@ class Identification:
     def by_records(self) -> bool:
         """Whether the sets of parameters are compared on separate validation records.
 
-        If not, they are compared on parts of the fitted records.
+        Otherwise, the sets are compared on parts of the fitted records.
         """
         return bool(self.validation) and self.validation[-1].further
 
@@ -188,7 +189,8 @@ class Identification:
     def model_columns(self) -> SetName:
         """Name of the set of parameters in the final model: "essential", "feasible" or "all".
 
-        `runtime.core.parameter_sets` explains the choice; it is "all" if the method is not linear.
+        `runtime.core.parameter_sets` explains the choice; the name is "all" if the method is not
+        linear.
         """
         return self.sets.used
 
@@ -196,7 +198,7 @@ class Identification:
     def model_estimate(self) -> Estimate:
         """Estimate of the parameters in the final model: essential, physical ("feasible") or all.
 
-        It is `estimate` if the method is not linear.
+        If the method is not linear, the final model is `estimate`.
         """
         return self.sets.estimate(self.sets.used)
 
@@ -204,7 +206,8 @@ class Identification:
     def whole_estimate(self) -> Estimate:
         """Estimate of all base parameters, to be written to a robot file or used in a program.
 
-        It is `model_estimate`, or the physical set if the essential set is used.
+        The result is the estimate of the set in use or, if that is the essential set, of the
+        physical set.
         """
         return self.written.estimate(self.written.whole)
 
@@ -255,24 +258,20 @@ class Identification:
         """
         return self.set_errors.get(self.model_columns, float("nan"))
 
-    @cached_property
-    def held_out_rows(self) -> tuple[tuple[Any, Any], ...]:
-        """Parts of the records that fits of other parts predict: rows of the fit and of the part.
+    @property
+    def held_out(self) -> Iterator[tuple[Observation, Observation]]:
+        """Parts of the records that fits of other parts predict: rows of the fit, and of the part.
 
-        Pairs of bool arrays of shape (r,); empty if separate records are predicted, or nothing is.
+        There are no parts if separate records are predicted, or no data are.
         """
         if not self.validation or self.by_records:
-            return ()
-        t, (first, *_) = self.observation.t, self.validation
-        if first.folds:
-            number = self.observation.equal_parts(first.folds)
-            return tuple((number != p, number == p) for p in np.unique(number))
-        windows = self.study.validate.split or halves(*self.observation.span)
-        inside = [
-            (t >= (-np.inf if a is None else a)) & (t <= (np.inf if b is None else b))
-            for a, b in windows
-        ]
-        return tuple((inside[0], part) for part in inside[1:])
+            return
+        if self.validation[0].folds:
+            yield from self.observation.folds(self.validation[0].folds)
+            return
+        first, *others = self.study.validate.split or halves(*self.observation.span)
+        for window in others:
+            yield self.observation.between(*first), self.observation.between(*window)
 
     @property
     def unseen_error(self) -> float:
@@ -284,8 +283,8 @@ class Identification:
     def negative(self) -> tuple[str, ...]:
         """Motor inertias and friction parameters that are certainly below zero.
 
-        They are taken from `model_estimate`. Sensors behind the gears measure neither, and are not
-        judged.
+        The values are those of the final model, `model_estimate`. Sensors behind the gears measure
+        neither inertia nor friction of motors, so that these are not judged.
         """
         if any(record.sides[1] == "link" for record in self.records):
             return ()
@@ -295,7 +294,8 @@ class Identification:
     def expected_error(self) -> float:
         """Expected relative error of torques predicted for other motions, %; nan if not computed.
 
-        If the records do not determine the parameters, it is LIMIT.LARGEST_EXPECTED.
+        If the records do not determine the parameters, the error is LARGEST_EXPECTED in
+        limits.toml.
         """
         if not self.determined:
             return float(LIMIT.LARGEST_EXPECTED)
@@ -354,8 +354,8 @@ class Identification:
     def own_warnings(self) -> tuple[str, ...]:
         """Warnings on single joints and from further analyses; correlations are left out.
 
-        Joints are named that have no rows, that have negative friction or motor inertia, or that
-        lost their parameters in the elimination.
+        The warnings name joints without rows, joints with negative friction or motor inertia, and
+        joints that lost their parameters in the elimination.
         """
         lost = lost_joints(self.estimate, self.model_estimate)
         joints = joint_labels(self.model)
@@ -369,7 +369,9 @@ class Identification:
         return tuple(sentence for sentence in sentences if sentence)
 
     def _negative_text(self) -> str:
-        """Name what is below zero; guess its cause only where the checks have found none."""
+        """Name the parameters that are below zero, with a guess at the cause if the checks have
+        found none.
+        """
         text = f"{', '.join(self.negative)} below zero, but friction and motor inertia cannot be negative"
         worst = self.checklist.worst
         if worst is not None and worst.state == "no" and not worst.outcome:
@@ -387,8 +389,9 @@ class Identification:
     def brief(self, others: int = 0) -> str:
         """Write a short text: verdict, largest doubt, next step, values, errors and warnings.
 
-        Values have 95 % intervals. The text is kept to about LIMIT.LINES_PRINTED lines; `to_text`
-        has everything. others : number of lines that are printed in addition to this text.
+        Values have 95 % intervals. The text has a limited number of lines (LINES_PRINTED in
+        limits.toml); `to_text` has everything. others : number of lines that are printed in
+        addition to this text.
         """
         ahead = [check for check in self.checklist.checks if check.ahead]
         first = [f"{check.finding}." for check in ahead]
@@ -517,7 +520,7 @@ class Identification:
     def motion_table(self) -> Table:
         """Make a table of the difference between simulated and measured motion, joint by joint.
 
-        It is empty unless the method simulates the closed loop.
+        The table is empty unless the method simulates the closed loop.
         """
         rows = [
             (

@@ -4,10 +4,10 @@
     to_mapping(study)                  # complete, defaults filled: written into every result
 
 Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1), with two exceptions: the
-cut-off follows from the record, and torques have no median filter. They are: Butterworth of order 4
-forward and backward on q and qd, central differences, parallel decimation by eq. (13), ordinary
-least squares, essential parameters by the threshold 1.04, five CESTAC runs. Units: SI, rad, Hz.
-Values are checked when a Study is made, so every Study is valid.
+cut-off follows from the record, and torques have no median filter. The defaults are: Butterworth of
+order 4 forward and backward on q and qd, central differences, parallel decimation by eq. (13),
+ordinary least squares, essential parameters by the threshold 1.04, five CESTAC runs. Units: SI,
+rad, Hz. Values are checked when a Study is made, so every Study is valid.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ class Lowpass(Settings):
     Attributes
     ----------
     cutoff : float or str, Hz
-        Cutoff frequency; auto: from the motion and the noise of each record
-        (`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and
-        50 if there is no record.
+        Cut-off frequency. auto: symgen derives it from the motion and the noise of each record
+        (`runtime.core.signals.cutoff`), doubles it for counts, and limits it to 50 Hz, the value of
+        the chapter, which is also used if there is no record.
     order : int
         Order of the filter.
     on : tuple of str
@@ -122,8 +122,9 @@ class Signals(Settings):
         decimation and no trim, whatever their settings are.
     velocity : str or float or tuple of float, Hz
         Use of recorded velocities (record.columns.qd), for reader lowpass: the frequency from which
-        they replace differences of q. auto: the frequency at which both have the same noise; they
-        are not used if they disagree with the positions. differences: they are not used.
+        they replace differences of q. auto: the frequency at which both have the same noise;
+        recorded velocities that disagree with the positions are not used. differences: recorded
+        velocities are never used.
     torque_median : int
         Window of the median filter on torques, odd number of samples; 1 switches it off. A median
         removes the pulses of a controller that answers every count of its encoder
@@ -155,11 +156,11 @@ class Rows(Settings):
         tenth of it.
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise there.
-        auto: found from the record for joints with dry friction in the model whose torques at rest
-        are not those of the model; zero for others.
+        auto: the speed is found from the record for joints with dry friction in the model whose
+        torques at rest differ from the model, and is zero for other joints.
     around : float, s
-        Rows within this time of such a row are left out too; low_speed: auto sets it to the reach
-        of the decimation.
+        Rows within this time of a row left out by low_speed are left out too; low_speed: auto sets
+        it to the reach of the decimation.
     """
 
     window: Interval = (None, None)
@@ -244,8 +245,8 @@ class CestacSettings(Settings):
     side : str
         Side of the encoder: joint or motor.
     rounding : str
-        Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is
-        random by joint and run.
+        Law of the perturbations; phase is the law of a real encoder: counts of steps, whose phase
+        is random for each joint and run.
     uneven : float
         Standard deviation of the lines of law phase from even spacing, in steps.
     delta : tuple of float, rad or m
@@ -260,10 +261,10 @@ class CestacSettings(Settings):
     torque : tuple of float or None, N m or N
         Steps of the perturbed motor torque (Table 4); null: none.
     common : bool
-        The same random numbers for every delta.
+        Whether every delta uses the same random numbers.
     median : int
         Window of the median filter on the rounded positions, 1 for none: a median enlarges the
-        bias. The estimate that runs are compared with has the median of signals.
+        bias. The estimate with which runs are compared uses the median of `signals`.
     """
 
     side: Literal["joint", "motor"] = "joint"

@@ -361,8 +361,9 @@ def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
     """Return the friction parameters and motor inertias of a fit that are certainly below zero.
 
-    Certainly means by LIMIT.CERTAIN_SIGN standard deviations, of which the larger kind is used.
-    Parameters that are regrouped with others are not tested.
+    A value is certainly below zero if it is several standard deviations below (CERTAIN_SIGN in
+    limits.toml), by the larger of the stated and the corrected deviation. Parameters that are
+    regrouped with others are not tested.
     """
     elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
     signed = {

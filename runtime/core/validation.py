@@ -129,7 +129,7 @@ class CrossValidation(Result):
     def errors(self) -> dict[str, float]:
         """Return the relative error, %, of torques that each set of parameters predicts.
 
-        It is the largest one of all predictions of data outside the fit.
+        The error of a set is the largest of its predictions of data outside the fit.
         """
         unseen = [p for p in self.predictions if not p.fitted]
         return {
@@ -322,8 +322,8 @@ class Direction:
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
     """Parameters that the record separates badly, because their estimates are correlated.
 
-    They are given as correlated pairs, as groups of such pairs, and as the directions of the
-    smallest singular values of W with unit columns.
+    The result lists correlated pairs, groups of such pairs, and the directions of the smallest
+    singular values of W with unit columns.
     """
 
     pairs: tuple[Pair, ...]

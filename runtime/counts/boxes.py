@@ -1,6 +1,6 @@
 """Estimation of a motion from encoder counts, which bound the position, by expectation propagation.
 
-The errors of counts and time stamps are those with the most evidence.
+The assumed errors of counts and time stamps are those with the largest evidence.
 
     tilted law of a sample    N(x; m, v) [Phi((hi - x)/e) - Phi((lo - x)/e)]
                               m, v without this sample; e^2 = count^2 + (time qd Ts)^2
@@ -12,7 +12,7 @@ The errors of counts and time stamps are those with the most evidence.
 
 Sites are updated all at once, with damping, which is stronger if precisions change more than
 before. Errors are tried from large to small ones: wide bounds settle in a few passes, and bounds
-that are too narrow for their counts lose evidence before they no longer settle.
+that are too narrow for their counts lose evidence before the iteration fails to settle.
 
 References: Minka (2001); Cunningham, Hennig and Lacoste-Julien (2011), boxes; MacKay (1992),
 evidence; docs/theory/counts.md.
@@ -134,8 +134,8 @@ class Boxes:
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
         """Estimate the motion by expectation propagation, for given errors of the counts.
 
-        Starts from the coefficients c and the sites (t, u), their precision and precision times
-        mean, and stops when the sites no longer change.
+        The iteration starts from the coefficients c and the sites (t, u), which are precision and
+        precision times mean, and stops when the sites no longer change.
         """
         basis, gaps = self.basis, np.flatnonzero(self.rest)
         tau, pull = self.rest.copy(), np.zeros(len(self.rest))
@@ -187,7 +187,7 @@ class Boxes:
     def agrees(self, read: Posterior) -> bool:
         """Whether the estimation has converged and the motion agrees with every count.
 
-        A distance of FAR standard deviations from an interval is allowed.
+        A distance of six standard deviations from an interval is allowed (`FAR`).
         """
         x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
         e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
@@ -198,8 +198,8 @@ class Boxes:
     def suspects(self, read: Posterior) -> Array:
         """Find the samples at which the counts may jump, for instance because counts were lost.
 
-        They are the sample with the largest density of the jerk, and the middles of the SUSPECTS
-        windows of time whose counts the other windows predict worst.
+        The result is the sample with the largest density of the jerk, and the middles of the
+        windows of time whose counts the other windows predict worst (`SUSPECTS` windows).
         """
         m, v, speed = read.without
         off = (m - (self.low + self.high) / 2) ** 2 / (v + read.errors.variance(speed) + 1 / 12)
@@ -211,8 +211,8 @@ class Boxes:
     def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
         """Estimate the motion again, only from the samples near the sample `middle`.
 
-        BESIDE samples on either side are used. Returns the first sample of this part, its bounds
-        and its motion.
+        The samples near it are those up to `BESIDE` samples away. Returns the first sample of this
+        part, its bounds and its motion.
         """
         m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
         first = max(0, middle - BESIDE) // m
@@ -229,13 +229,12 @@ class Boxes:
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
         """Find the sample at which a jump of the counts is most likely, near sample number `near`.
+
         From this sample on, all counts are wrong by a constant.
 
-        Returns the sample, the error in counts, and the rise of the log posterior if it is
-        corrected.
-
-        The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
-        its curvature sum tau - (B tau)' A^-1 (B tau).
+        Returns the sample, the error in counts, and the rise of the log posterior if the error is
+        corrected. The slope of the log posterior by the error is g = sum (nu - tau x) over the
+        later sites, its curvature sum tau - (B tau)' A^-1 (B tau).
         """
         away = np.abs(self.sites - near)
         at = np.flatnonzero((away - away.min()) * self.basis.Ts < WINDOW)
@@ -280,8 +279,9 @@ def of_most_evidence(
 ) -> Posterior:
     """Find the most likely size of count and time-stamp errors, and estimate the motion with it.
 
-    The search starts from `start` and changes the errors by one element of `sizes` or CLOCK_ERRORS
-    at a time, in the directions `moves`, as long as the evidence clearly rises.
+    The search starts from `start` and changes the errors by one element of `sizes` or of the clock
+    errors (`CLOCK_ERRORS`) at a time, in the directions `moves`, as long as the evidence clearly
+    rises.
     """
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
@@ -320,8 +320,8 @@ def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
     """Estimate the spectral density of the jerk around each of the M intervals of the spline.
 
-    The estimate follows MacKay's rule. The whole record has the weight of OF_RECORD determined
-    jerks in every window.
+    The estimate follows MacKay's rule. In every window, the whole record counts as much as a fixed
+    number of determined jerks (`OF_RECORD`).
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,

@@ -2,7 +2,7 @@
 
 A position used as measured has an error of variance step^2/12. Through the filters of the study it
 becomes an error of qdd of variance v. The columns of W are then too small by about v divided by the
-mean square of qdd. If this share is above HELPS, the bias justifies `reader: counts`.
+mean square of qdd. If this share is above 1 % (`HELPS`), the bias justifies `reader: counts`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LOOKED_AT = 2**16
 class EncoderSteps(Part):
     """Advice on the records whose motion should be estimated from encoder counts.
 
-    It is computed when it is first needed.
+    The advice is computed when it is first needed.
     """
 
     result: Identification
@@ -93,7 +93,7 @@ def acceleration_error(
 ) -> float:
     """Compute the share of encoder-step errors in the mean squared acceleration of the worst joint.
 
-    The accelerations are filtered. 0 if the positions show no steps.
+    The accelerations are filtered. The result is 0 if the positions show no steps.
     """
     found = _steps(record, states, signals, drives)
     return 0.0 if found is None else float(found[1].max())

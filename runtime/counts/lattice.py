@@ -56,7 +56,8 @@ class Lattice:
     counted : tuple of tuple of int
         For each encoder: how many counts of the device one step may be.
     rounded : bool
-        Whether positions are off the lattice a little, as if rounded to few digits.
+        Whether positions differ a little from the lattice, as if they had been rounded to few
+        digits.
     """
 
     step: Array
@@ -152,7 +153,7 @@ def lattice(
 def smallest_step(x: Array) -> float:
     """Estimate the step of an encoder from the distances between its positions x, shape (N,).
 
-    0 if the positions never change.
+    The result is 0 if the positions never change.
     """
     values = np.unique(x)
     gaps = np.diff(values)

@@ -43,7 +43,7 @@ class OwnEncoder:
         Steps of the encoder, on the side study.cestac.side.
     reading : Reading or None
         Motion estimated from the counts; None if every Delta of the study is coarse compared with
-        the own step.
+        the encoder's own step.
     drives : Drives or None
         Drives between the joints and the encoders of `reading`; None for encoders at the joints.
     """
@@ -72,8 +72,8 @@ class OwnEncoder:
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
     """Determine the encoder steps of a record, for a study that simulates coarser encoders.
 
-    The study needs the setting `rounding: phase`. None for other kinds of rounding, which take
-    every position as exact.
+    The study needs the setting `rounding: phase`. The result is None for other kinds of rounding,
+    which take every position as exact.
 
     Raises
     ------

@@ -48,8 +48,8 @@ def counted(record: Record, signals: Signals) -> States:
 def rounded(record: Record, signals: Signals, step: Steps, side: Any) -> States:
     """Compute the joint states of a record whose encoders have known steps on `side` of the gears.
 
-    The phase of the counts is not known. step : rad or m; 0: the positions are exact, and only the
-    filters of the study are used.
+    The phase of the counts is not known. step : step of the encoders, rad or m; for 0, the
+    positions are exact and only the filters of the study are used.
     """
     if not step:
         return filtered_states(record.q, record.rate, signals)
@@ -59,8 +59,8 @@ def rounded(record: Record, signals: Signals, step: Steps, side: Any) -> States:
 def motion(x: Array, rate: float, step: float, starts: Any = None) -> tuple[Array, Array, Any]:
     """Estimate the motion of m encoders of one step from their positions x, shape (N, m).
 
-    Return positions, standard deviations of the velocities, and `starts` for the same motion at
-    other phases.
+    Return positions, standard deviations of the velocities, and `starts`, the initial values for
+    the same motion at other phases.
     """
     reading = read_counts(x, rate, step, starts=starts)
     return *reading.motion, reading.starts

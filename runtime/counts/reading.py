@@ -3,10 +3,10 @@
     reading = read_counts(position, rate, step)        encoder side, shape (N, n)
     reading.q, reading.s_q, reading.findings
 
-The theory is in docs/theory/counts.md. Records longer than STRETCH samples are processed in
-stretches that overlap by MARGIN samples on either side, so memory and time are linear in their
-length. A missing sample follows from its neighbours by the posterior. In a gap in which the
-posterior does not determine the position to half a step, the state is unknown.
+The theory is in docs/theory/counts.md. Long records are processed in stretches (of `STRETCH`
+samples) that overlap on either side (by `MARGIN` samples), so that memory and time are proportional
+to the length of the record. A missing sample follows from its neighbours by the posterior. In a gap
+in which the posterior does not determine the position to half a step, the state is unknown.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Reading:
     s_q, s_qd, s_qdd : ndarray, shape (N, n)
         Standard deviations of the posterior.
     unknown : ndarray of bool, shape (N, n)
-        Gaps in which the counts around do not determine the state, and the samples near these gaps
-        that filters spoil.
+        Gaps in which the neighbouring counts do not determine the state, and the samples near these
+        gaps that the filters spoil.
     step, phase : ndarray, shape (n,), rad or m
         Lattice of the encoders.
     findings : tuple of str
@@ -91,7 +91,7 @@ class Reading:
     def starts(self) -> Starts:
         """Starting values to estimate the same motion again with other encoder offsets (phases).
 
-        They are listed by the first sample of a stretch and the encoder, from 0.
+        The key of a value is the first sample of its stretch and the number of its encoder, from 0.
         """
         return {
             (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
@@ -161,8 +161,9 @@ def read_counts(
         Name of the record in error messages.
     starts : mapping, optional
         Reading.starts of the same motion at other phases of encoders of the same steps. The errors
-        of the counts, the knots and the first density of the jerk are copied from it, which saves
-        three quarters of the time or more. They are searched anew if the counts contradict them.
+        of the counts, the knots and the first density of the jerk are copied from this result,
+        which saves three quarters of the time or more. If the counts contradict them, the search
+        starts anew.
 
     Returns
     -------
@@ -194,7 +195,7 @@ def _reading(
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
         part, read, left = read_stretch(counts[begin:end], rate, gaps.rest(counts), ahead)
         unknown[first:stop] = left[kept]
-        gaps.take(counts[first:stop], left[kept])
+        gaps.update(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
             x[first:stop] = own[kept]
         if part is not None:
@@ -225,8 +226,8 @@ def read_stretch(
 
     If the count of an encoder never changes, the joint rests in the middle of its interval; an
     encoder without a count is at `rest`, shape (n,). `starts` holds the starts of the search by
-    encoder. If one count goes to and fro, the lines of all encoders are widened, since joints share
-    a controller, and the directions near such passages are uncertain.
+    encoder. If one count goes to and fro, the bounds of all encoders are widened, because the
+    joints share a controller, and the directions of motion near such moments are uncertain.
     """
     N, n = counts.shape
     k = np.ascontiguousarray(counts.T)
@@ -295,7 +296,7 @@ class Gaps:
         first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
         return np.where(np.isnan(self.last), first, self.last)
 
-    def take(self, counts: Array, unknown: Array) -> None:
+    def update(self, counts: Array, unknown: Array) -> None:
         """Update the statistics of missing samples with the next counts of the record.
 
         Both arrays have shape (B, n); `unknown` marks the samples with unknown state.
@@ -313,7 +314,7 @@ class Gaps:
     def findings(self, rate: float) -> tuple[str, ...]:
         """Write a sentence for each encoder with missing samples.
 
-        It gives their number and how they were treated.
+        The sentence gives the number of missing samples, and how they were replaced.
         """
         return tuple(
             (

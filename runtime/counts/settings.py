@@ -14,9 +14,10 @@ class Signals(chapter.Signals):
     Attributes
     ----------
     step : float or tuple of float or None, rad or m
-        Step of the encoders, for counts; null: from the record.
+        Step of the encoders, for the reader counts; null: found from the record.
     side : str
-        Side of the encoders, for counts: joint, or motor by the drives of the robot.
+        Side of the encoders, for the reader counts: joint, or motor (converted by the drives of the
+        robot).
     """
 
     step: PerJoint[Positive] | None = None

@@ -3,10 +3,10 @@
     lo_k <= x(t_k) <= hi_k,   lo_k = count_k - 1/2, hi_k = count_k + 1/2
                               in steps of the encoder; at every sample
 
-The motion has a white jerk as prior, and its posterior is found by expectation propagation, in the
-same way at all speeds. A site is a sample whose bounds are used; a normal law replaces the bounds.
-The first sites come from the changes of the count: two neighbouring intervals give the position (k
-+ 1/2) with the error qd Ts/sqrt(12). `runtime.counts.boxes` then updates the sites, and finds the
+The prior of the motion is a white jerk; expectation propagation computes the posterior, in the same
+way at all speeds. A site is a sample whose bounds are used; a normal law replaces the bounds. The
+first sites come from the changes of the count: two neighbouring intervals give the position (k +
+1/2) with the error qd Ts/sqrt(12). `runtime.counts.boxes` then updates the sites, and finds the
 errors of counts and time stamps. The density of the jerk follows from MacKay's rule: the sum of
 squared jerks over the number of jerks that the record determines, in windows of time with the whole
 record as prior. Lost counts are found and corrected here.
@@ -89,7 +89,7 @@ class SearchStart(NamedTuple):
 class Smoothed:
     """The motion of one encoder, estimated from its counts, in steps from the count `origin`.
 
-    said : sentence about the errors of the counts, or empty.
+    said : sentence about the errors of the counts, which may be empty.
     """
 
     basis: Basis
@@ -100,7 +100,8 @@ class Smoothed:
     def state(self, order: int) -> tuple[Array, Array]:
         """Return the mean and standard deviation of the position, or of a derivative.
 
-        `order` is the order of the derivative, 0 for the position; shape (N,) each.
+        `order` is the order of the derivative, 0 for the position; both results have the shape
+        (N,).
         """
         N = self.basis.N
         mean = self.basis.at_samples(self.read.c, order)[:N]
@@ -119,7 +120,7 @@ def smoothed(
     """Estimate the motion of one encoder from its counts, shape (N,); nan if a sample is missing.
 
     uneven : standard deviation of the encoder lines from even spacing, in steps, used as a lower
-        limit; None: estimated.
+      limit; None: the deviation is estimated.
     start : result for the same motion at another phase, from which the search starts; default: a
         global search.
 
@@ -169,9 +170,10 @@ class Counts:
     ) -> tuple[Boxes, Posterior]:
         """Estimate the motion from the counts, and check that it agrees with every count.
 
-        The most likely errors of the counts are estimated too: in the liveliest part of a long
-        record, or from the errors in `start`. If the motion does not agree with every count, larger
-        errors are tried. Raises InputError if no motion agrees with the counts.
+        The most likely errors of the counts are estimated too: from the part of a long record in
+        which the count changes most often, or from the errors in `start`. If the motion does not
+        agree with every count, larger errors are tried. Raises InputError if no motion agrees with
+        the counts.
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:
@@ -195,7 +197,9 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """Extract the LIVELIEST consecutive samples in which the count changes most often."""
+        """Extract the consecutive samples (at most `LIVELIEST`) in which the count changes most
+        often.
+        """
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
@@ -207,8 +211,8 @@ class Counts:
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
         """Estimate the motion, and the sizes of the count errors that make the counts most likely.
 
-        The smallest errors are used unless larger ones have UNEVEN nats more evidence. If the
-        errors of the counts are large, errors of the clock are tried too.
+        The smallest errors are used unless the evidence of larger errors is at least 40 nats higher
+        (`UNEVEN`). If the errors of the counts are large, errors of the clock are tried too.
         """
         wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
         boxes, read = self.first(Errors(wide))
@@ -253,8 +257,9 @@ class Counts:
     def sites(self, density: float) -> Array:
         """Choose the samples whose bounds are used (the sites), in ascending order.
 
-        They are both sides of every change of the count and of every gap, and some samples between
-        them. Bounds of samples close together are not independent, so only one of them is used.
+        The sites are the samples on both sides of every change of the count and of every gap, and
+        some samples between them. Bounds of samples close together are not independent, so that
+        only one of several close samples is used.
         """
         known = self.measured
         change = np.flatnonzero((np.diff(self.y[known]) != 0) | (np.diff(known) > 1))
@@ -272,7 +277,7 @@ class Counts:
 
         Returns, for every sample, the precision and its product with the mean. The two samples
         around a change have the most precision; other samples have little, missing samples `rest`.
-        A change across a gap longer than KNOTS is not used.
+        A change across a long gap (more than `KNOTS`) is not used.
         """
         y, known, near = self.y, self.measured, max(1, round(KNOTS / self.Ts))
         tau = self.rest.copy()
@@ -302,8 +307,8 @@ class Counts:
     def leaps(self) -> list[tuple[int, int]]:
         """Find single changes of the count that are too large for a smooth motion of the encoder.
 
-        Returns the sample and the number of counts of each. The change differs from a parabola
-        through its neighbours by more than LEAP times as much as the neighbours do.
+        Returns the sample and the number of counts of each change. Such a change differs much more
+        (`LEAP` times) from the parabola through its neighbours than the neighbours do.
         """
         y, known = self.y, self.measured
         change = np.diff(y[known])
@@ -321,9 +326,10 @@ class Counts:
     def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
         """Find a jump of the counts that a smooth motion does not explain, such as lost counts.
 
-        Returns the sample and the number of counts, or None. Without the jump the record around it
-        must be more likely by LIKELIER nats. Nothing is searched if the errors of the counts are
-        the least ones and the jerk has no peak above SPIKE times its mean density.
+        Returns the sample and the number of counts, or None. Without the jump, the record around it
+        must be clearly more likely (by `LIKELIER` nats). No search is made if the errors of the
+        counts have their smallest value and the jerk has no high peak (above `SPIKE` times its mean
+        density).
         """
         spikes = read.density.max() > SPIKE * read.density.mean()
         if len(boxes.sites) < FEWEST or not (spikes or read.errors.count > COUNT_ERRORS[0]):
@@ -371,7 +377,7 @@ def _spline_through_sites(
     """Fit a spline to positions with Gaussian errors, and estimate the density of its white jerk.
 
     Returns the coefficients and the density, shape (M,), which starts from `density` and is updated
-    at most FIRST times.
+    a few times (at most `FIRST`).
     """
     tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
     samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)

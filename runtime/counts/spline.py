@@ -7,8 +7,8 @@ Means, standard deviations and draws need a time linear in the number of samples
         c_i)/h^3 is constant
     prior      j_i independent, of variance r_i/h: the white jerk of density r, held over h
     sample k   precision tau_k about nu_k/tau_k
-    posterior  precision A = sum_k tau_k b_k b_k' + sum_i (h/r_i) d_i d_i',  a band of 3 beside its
-    diagonal,  A c = sum_k nu_k b_k
+    posterior  precision A = sum_k tau_k b_k b_k' + sum_i (h/r_i) d_i d_i',  a band of 3 next to
+    its diagonal,  A c = sum_k nu_k b_k
 
 A = L L' by LAPACK. The elements of Z = A^-1 within the band follow from L backward in time
 (Takahashi): c_i given the later coefficients is normal, of mean l_i'(c_(i+1), c_(i+2), c_(i+3)) and
@@ -78,7 +78,7 @@ class Basis:
     def least_density(self) -> float:
         """Smallest spectral density of the jerk for which the precision matrix A can be factored.
 
-        A is that of the spline coefficients. Unit: steps^2/s^5.
+        A is the precision of the spline coefficients. Unit: steps^2/s^5.
 
         The precision of a site is 0.06 or more.
         """
@@ -140,8 +140,8 @@ class Basis:
     def of_samples(self, tau: Array) -> Array:
         """Compute how much the samples add to the precision matrix A of the spline, shape (4, P).
 
-        It is sum_k tau_k b_k b_k', with tau_k the precision of sample k and b_k the B-splines
-        there.
+        The addition is sum_k tau_k b_k b_k', with tau_k the precision of sample k and b_k the
+        B-splines at this sample.
         """
         samples = self.products.T @ tau.reshape(-1, self.m).T
         A = np.zeros((4, self.P))
@@ -152,7 +152,8 @@ class Basis:
     def of_prior(self, density: Array) -> Array:
         """Compute how much the prior, a white jerk, adds to the precision matrix A of the spline.
 
-        It is sum_i (h/r_i) d_i d_i', with r_i the density and d_i'c the jerk in interval i.
+        The addition is sum_i (h/r_i) d_i d_i', with r_i the density and d_i'c the jerk in interval
+        i.
         """
         prior = 1 / (self.h**5 * density)
         A = np.zeros((4, self.P))
@@ -176,7 +177,7 @@ class Basis:
 def third_differences(c: Array) -> Array:
     """Compute the third differences of the spline coefficients c, one for each of M intervals.
 
-    They are c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i.
+    A third difference is c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i.
     """
     return np.asarray(c[3:] - c[:-3] + 3 * (c[1:-2] - c[2:-1]))
 
@@ -219,7 +220,7 @@ class Factor:
     def inverse(self) -> Array:
         """Compute the elements of the covariance matrix Z = A^-1 near its diagonal, shape (4, P).
 
-        They are Z_(i, i + lag) for lags 0 to 3.
+        The elements are Z_(i, i + lag) for lags 0 to 3.
         """
         T = self.L.shape[1]
         length = max(8, int(LENGTH * np.sqrt(T)))
@@ -256,7 +257,7 @@ class Factor:
 def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
     """Compute the next estimate of the spectral density r of a spline's jerk by MacKay's rule.
 
-    It is the sum of squared jerks over the number of jerks that the samples determine.
+    The density is the sum of squared jerks over the number of jerks that the samples determine.
 
     samples, unit : parts of A that come from the samples, and from a prior of density one.
     g : gradient at c = 0.
@@ -276,8 +277,9 @@ def _joined(first: Array, through: Array) -> Array:
 
     Returns an array of shape (3, 3, stretches).
 
-    first : covariance of the first three coefficients of a stretch, given the three behind it.
-    through : matrix by which the first three depend on the three behind.
+    first : covariance of the first three coefficients of a stretch, given the three coefficients
+      after the stretch.
+    through : matrix by which the first three coefficients depend on the three after the stretch.
     Both have the shape (stretches, 3, 3).
     """
     ends, S = np.empty_like(first), np.zeros((3, 3))

@@ -199,7 +199,7 @@ class CestacDocument:
 def load_estimate(path: Path | str) -> Estimate:
     """Read an estimate from a file that `Estimate.to_json` or `symgen identify -o` wrote.
 
-    InputError as for `Estimate.from_json`.
+    Raise InputError as for `Estimate.from_json`.
     """
     return from_text(Estimate, result_text(path), ESTIMATE, str(path))
 
@@ -207,10 +207,10 @@ def load_estimate(path: Path | str) -> Estimate:
 def load_whole_estimate(path: Path | str) -> Estimate:
     """Read from estimate.json the values of all base parameters that a robot model should use.
 
-    The estimate has names, X, sigma_corrected, relative_error and details.standard of the
-    parameter set that is used, or of the physical parameters if the essential set is used
-    (`whole_set`). The other fields, for instance the covariance, are those of least squares.
-    InputError as for `load_estimate`.
+    The estimate has names, X, sigma_corrected, relative_error and details.standard of the parameter
+    set that is used, or of the physical parameters if the essential set is used (`whole_set`). The
+    other fields, for instance the covariance, are those of least squares. Raises InputError as
+    `load_estimate` does.
     """
     fit, document = _fit_and_sets(path)
     if document is None:
@@ -238,9 +238,10 @@ def load_whole_estimate(path: Path | str) -> Estimate:
 
 
 def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
-    """Read two estimates from estimate.json: that of all parameters, and that of the set in use.
+    """Read two estimates from estimate.json: the estimate of all parameters, and that of the set in
+    use.
 
-    InputError as for `load_estimate`.
+    Raises InputError as `load_estimate` does.
     """
     fit, document = _fit_and_sets(path)
     if document is None:
@@ -249,7 +250,9 @@ def load_used_set(path: Path | str) -> tuple[Estimate, Estimate | SetDocument]:
 
 
 def _fit_and_sets(path: Path | str) -> tuple[Estimate, SetsDocument | None]:
-    """Read estimate.json as a plain estimate, and, if the file has several sets, with these."""
+    """Read estimate.json twice: as a plain estimate, and as an estimate with all sets, if the file
+    has several.
+    """
     text = result_text(path)
     fit = from_text(Estimate, text, ESTIMATE, str(path))
     has_sets = json.loads(text).get("sets")

@@ -19,7 +19,7 @@ LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 
 
 
 def require_file(path: Path) -> int:
-    """Return the size of a file, bytes; InputError for a folder, a pipe or a device.
+    """Return the size of a file, bytes; raise InputError for a folder, a pipe or a device.
 
     A pipe or a device might never answer or never end.
     """
@@ -36,7 +36,7 @@ def require_file(path: Path) -> int:
 
 
 def result_text(path: str | Path) -> str:
-    """Read the text of a file with a JSON result; InputError if the file is too large."""
+    """Read the text of a file with a JSON result; raise InputError if the file is too large."""
     path = Path(path)
     try:
         if require_file(path) > LARGEST:
@@ -52,7 +52,7 @@ def result_text(path: str | Path) -> str:
 
 
 def text_of(path: str | Path) -> str:
-    """Read the text of a settings file; InputError if the file is too large."""
+    """Read the text of a settings file; raise InputError if the file is too large."""
     path = Path(path)
     if require_file(path) > 4 * LIMIT.YAML_CHARACTERS:  # bytes of so many characters
         raise InputError(

@@ -2,7 +2,7 @@
 
 Only the parts of YAML that settings need are accepted: mappings, lists and scalars of the core
 schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that
-the values are those that a person sees in the file, and no text grows in memory.
+a person sees all values in the file, and no text expands to a larger one in memory.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     """Convert a YAML text to plain values; also return the line number of every key.
 
     Line numbers start at 1, and a key is identified by its path. Plain values are dict (keys as
-    texts), list, str, int, float, bool and None. SettingsError has file and line.
+    texts), list, str, int, float, bool and None. A SettingsError names file and line.
     """
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
@@ -58,12 +58,12 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         raise SettingsError(
-            f"not YAML: {e.problem or e.context}",
+            f"the text is not YAML: {e.problem or e.context}",
             file=file,
             line=None if mark is None else mark.line + 1,
         ) from None
     except Exception as e:  # the scanner raises IndexError, AttributeError and others too
-        raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
+        raise SettingsError(f"the text is not YAML: {first_line(e)}", file=file) from None
 
 
 def yaml_text(mapping: Mapping[str, Any], comments: Mapping[Path, str] | None = None) -> str:
@@ -87,7 +87,8 @@ def yaml_text(mapping: Mapping[str, Any], comments: Mapping[Path, str] | None = 
 def _commented(text: str, comments: Mapping[Path, str]) -> str:
     """Add comments at the ends of the lines of a YAML text, each at the line of its path.
 
-    A key whose line was joined to that of a mapping, {t: s, q: rad}, has its comment there.
+    A key inside a mapping on one line, such as {t: s, q: rad}, has its comment at the end of that
+    line.
     """
     _, numbers = yaml_values(text, file="study")
     lines = text.split("\n")
@@ -101,7 +102,9 @@ def _commented(text: str, comments: Mapping[Path, str]) -> str:
 
 
 def _yaml() -> Any:
-    """Return a reader and writer of YAML 1.2; its package is loaded only when this is called."""
+    """Return a reader and writer of YAML 1.2; its package is loaded by the first call of this
+    function.
+    """
     from ruamel.yaml import YAML
 
     return YAML(typ="safe", pure=True)

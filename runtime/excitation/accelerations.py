@@ -2,10 +2,10 @@
 
     qdd_j = max(qd_j / T, a_j),    T = 1 s
 
-qd_j is the largest velocity of joint j, which it then reaches from rest in T, and a_j is the largest
-acceleration of the records, which the robot has made already:
+qd_j is the largest velocity of joint j, which the joint then reaches from rest in the time T. a_j
+is the largest acceleration in the records, which the robot has made already:
 
-    a_j = root(1 - s_j) |qdd_j|, the quantile LIMIT.LARGEST of all samples
+    a_j = root(1 - s_j) |qdd_j|, a high quantile of all samples (LARGEST in limits.toml)
 
 qdd_j comes from positions through a low-pass filter whose cut-off suits the motion; s_j is the share of
 the position noise in its power, so that coarse encoders do not enlarge a_j.

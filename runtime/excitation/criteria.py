@@ -13,9 +13,9 @@ of their parameter, so that parameters are compared by their relative error.
 %sigma is predicted by `runtime.core.rows.predicted`.
 
 W is the observation matrix of the identification: the motion, sampled at the controller rate,
-passes through the filters and the decimation of the study. Parameters smaller than a hundredth of
-the largest of their unit count as if they had that size. `runtime.excitation.search` searches the
-motion.
+passes through the filters and the decimation of the study. A parameter smaller than a hundredth of
+the largest parameter of its unit counts as if it had the size of this hundredth.
+`runtime.excitation.search` searches for the motion.
 """
 
 from __future__ import annotations
@@ -112,8 +112,8 @@ def limits_of(
 ) -> MotionLimits:
     """Combine the limits of the robot file with the limits in `given`, which replace them.
 
-    Accelerations without a limit get one from the velocities and from `records`
-    (`runtime.excitation.accelerations`).
+    If the acceleration of a joint has no limit, a limit is computed from the velocities and from
+    `records` (`runtime.excitation.accelerations`).
 
     Raises SettingsError if q or qd has no limit.
     """
@@ -152,7 +152,7 @@ def limits_of(
 
 
 def _largest(model: GeneratedModel, name: str, given: Any) -> Array:
-    """Read the limits `name` of all joints, shape (n,): above 0; inf if none is given."""
+    """Read the limits `name` of all joints, shape (n,), each above 0; inf if no limit is given."""
     n = len(model.JOINTS)
     limits = np.array(np.inf if given is None else given, dtype=float)
     if limits.ndim and limits.shape != (n,):
@@ -181,8 +181,8 @@ def _assumed(model: GeneratedModel, qd: Array, records: Sequence[Record]) -> tup
     more = f", and the largest of the record for joint {', '.join(joints)}" if joints else ""
     line = ", ".join(f"{x:g}" for x in qdd)
     return qdd, (
-        f"No file limits the accelerations; the limits are the velocities reached in "
-        f"{LIMIT.RISE_TIME:g} s{more}. This line of the study file changes them: "
+        f"Neither robot file nor study limits the accelerations; symgen takes those that reach the "
+        f"largest velocity in {LIMIT.RISE_TIME:g} s{more}. This line of the study file changes them: "
         f"excitation: {{limits: {{qdd: [{line}]}}}}"
     )
 
@@ -200,8 +200,8 @@ def weights_of(
     The rows are scaled by the standard deviations of the torques, the columns by the sizes of the
     parameters, from their values X.
 
-    `essential`, `s`: essential parameters, and standard deviations of the torques, of an estimate
-    if there is one.
+    `essential`, `s` : essential parameters, and standard deviations of the torques, from an
+    estimate if there is one.
     """
     n = len(model.JOINTS)
     names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")

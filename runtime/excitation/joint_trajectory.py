@@ -21,7 +21,9 @@ FIELDS = ("positions", "velocities", "accelerations")
 
 
 def joint_names(model: GeneratedModel) -> tuple[str, ...]:
-    """Return the names of the joints in the robot file; joint1, joint2 ... where it has none."""
+    """Return the names of the joints in the robot file, or joint1, joint2 ... for joints without a
+    name.
+    """
     names = getattr(model, "LABELS", {})
     return tuple(str(names.get(j, f"joint{j}")) for j in model.JOINTS)
 
@@ -31,8 +33,8 @@ def joint_trajectory(
 ) -> str:
     """Write the points of a motion as a JointTrajectory, YAML text.
 
-    A controller interpolates between points; so every k-th sample is a point, at most
-    LIMIT.POINTS_PER_SECOND, and the last one.
+    A controller interpolates between points; so every k-th sample is a point (at most
+    POINTS_PER_SECOND in limits.toml), and the last sample.
 
     names : names of the joints. t : shape (N,), s, from 0. q, qd, qdd : shape (N, n), rad or m, per
         s, per s^2. rate : Hz.

@@ -1,12 +1,13 @@
-"""Search static poses that determine the gravity parameters best, within the limits of the joints.
+"""Search for static poses that determine the gravity parameters best, within the limits of the joints.
 
 W holds the rows of the poses, divided by the standard deviations s_j of the torques; W0 holds the
 rows of poses that were recorded already, if there are any. The search finds
 
     max log det M,  M = W0'W0 + W'W        C = M^-1, the predicted covariance
 
-by exchange: each pose in turn is replaced by the one of CANDIDATES random poses that enlarges the
-determinant most, until no pose does. The result is the best of several random starts.
+by exchange: each pose in turn is replaced by that of many random poses (`CANDIDATES`) which
+enlarges the determinant most, until no exchange enlarges it. The result is the best of several
+random starts.
 
 References: Fedorov (1972), Theory of Optimal Experiments; Atkinson, Donev and Tobias (2007).
 """
@@ -19,7 +20,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, joint_labels, require_no_channels, require_no_wrench
+from runtime.core.model import GeneratedModel, joint_labels, require_no_axes, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
@@ -93,7 +94,7 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
 
 
 def static_poses(problem: Problem) -> StaticPoses:
-    """Search the static poses that determine the gravity parameters best, within the limits of q.
+    """Search for the static poses that determine the gravity parameters best, within the limits of q.
 
     study.excitation.poses is the number of poses, default 20.
 
@@ -111,7 +112,7 @@ def static_poses(problem: Problem) -> StaticPoses:
     """
     model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
     require_no_channels(model, "the search for poses")
-    require_no_wrench(model, "the search for poses")
+    require_no_axes(model, "the search for poses")
     if problem.records and not problem.reader.at_rest:
         raise InputError(
             "new poses can be added only to a record of poses at rest; set signals: {reader: static}"
@@ -197,7 +198,9 @@ def _sum(A: Array, M: Array, chosen: Array) -> Array:
 
 
 def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
-    """Exchange poses while this raises det M of the information matrix M; return pose numbers."""
+    """Exchange poses as long as an exchange raises det M of the information matrix M; return pose
+    numbers.
+    """
     chosen, before = chosen.copy(), np.empty(0)
     while not np.array_equal(chosen, before):
         before = chosen.copy()
@@ -211,8 +214,8 @@ def _exchanged(A: Array, M: Array, chosen: Array) -> Array:
 def _quality(M: Array) -> tuple[float, Array]:
     """Compute the condition number of W and the standard deviations of the parameters from M = W'W.
 
-    The standard deviations have shape (c,). All results are infinite if the condition number is
-    LARGEST_CONDITION or more: then W does not determine the parameters.
+    The standard deviations have shape (c,). All results are infinite if the condition number is 1e4
+    or more (`LARGEST_CONDITION`): then W does not determine the parameters.
     """
     condition, sigma = float(np.sqrt(np.linalg.cond(M))), np.sqrt(np.diag(np.linalg.inv(M)))
     return (condition, sigma) if condition < LARGEST_CONDITION else (np.inf, np.inf * sigma)

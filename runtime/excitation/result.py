@@ -95,8 +95,8 @@ class Excitation(Result):
     starts : tuple of Start
         All starts, by number.
     margin : float
-        Share of the limits left free at the points of the grid. It was enlarged if the motion
-        exceeded a limit between these points.
+        Share of the limits left free at the points of the grid. The margin was enlarged if the
+        motion exceeded a limit between these points.
     settings : ExcitationSettings
     limits : MotionLimits
     known : Known
@@ -184,7 +184,7 @@ class Excitation(Result):
         )
         return (
             f" This motion determines {len(before) - len(worse)} of {len(before)} parameters "
-            f"better than the motion of the record, and WORSE: {named}{more}."
+            f"better than the motion of the record. It determines these WORSE: {named}{more}."
         )
 
     @property
@@ -209,7 +209,7 @@ class Excitation(Result):
     def verdict(self) -> str:
         """Text with cond(W), the least certain parameter, and the joints without torque limit.
 
-        It also names the parameters that the motion of the record determines better.
+        The text also names the parameters that the motion of the record determines better.
         """
         of_record = (
             ""
@@ -222,7 +222,7 @@ class Excitation(Result):
             else "the limits of position, velocity and acceleration"
         )
         return (
-            f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) "
+            f"The motion takes {self.motion.duration:.1f} s, keeps {kept}, and has weighted cond(W) "
             f"{self.condition:.1f}{of_record}; "
             f"{self._least_certain}.{self.comparison}{self._bare}{self.torques} {self.not_judged}"
         )
@@ -251,7 +251,9 @@ class Excitation(Result):
 
     @property
     def _least_certain(self) -> str:
-        """Words on the parameter with the largest %sigma, of those that can be told from zero."""
+        """Words on the parameter with the largest %sigma among the parameters that can be
+        distinguished from zero.
+        """
         told = {name: x for name, x in self.relative_sigma.items() if 1.96 * x < 100}
         if not told:
             return "the 95 % interval of every parameter contains zero"

@@ -1,4 +1,4 @@
-"""Search an exciting motion from random starts, and predict the precision of the best motion.
+"""Search for an exciting motion from random starts, and predict the precision of the best motion.
 
     excitation = excite(model, record, study)         # section `excitation` of the study
     excitation.verdict, excitation.relative_sigma     # predicted %sigma of every parameter
@@ -25,8 +25,8 @@ from runtime.core.model import (
     GeneratedModel,
     base_columns,
     require,
+    require_no_axes,
     require_no_channels,
-    require_no_wrench,
 )
 from runtime.core.problem import Problem, observe_rows
 from runtime.core.rows.predicted import Weights, kept_correlation
@@ -50,7 +50,7 @@ def excite(
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """Search the motion of best criterion within the limits at every sample of the controller.
+    """Search for the motion of best criterion within the limits at every sample of the controller.
 
     The search runs from all starts of study.excitation.
 
@@ -74,7 +74,7 @@ def excite(
     model = problem.model
     study: Any = problem.settings
     require_no_channels(model, "the search for a motion")
-    require_no_wrench(model, "the search for a motion")
+    require_no_axes(model, "the search for a motion")
     problem.require_motion("the search for a motion (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     limits = limits_of(model, settings.limits, problem.records)
@@ -205,10 +205,12 @@ def _with_values(
     values: Mapping[str, float],
     essential: Sequence[str],
 ) -> tuple[ExcitationSettings, tuple[str, ...]]:
-    """Leave out the parameters whose unit has no value in the robot file, as friction in most URDFs.
+    """Leave out parameters for whose unit the robot file has no value, such as friction in most
+    URDFs.
 
     A criterion compares parameters by their size. Returns settings that name the other parameters,
-    and the names left out: none if the user names parameters, or if no parameter has a value.
+    and the names left out. No name is left out if the user names parameters, or if no parameter has
+    a value.
     """
     if settings.columns not in ("essential", "all"):
         return settings, ()

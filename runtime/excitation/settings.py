@@ -42,7 +42,7 @@ class ExcitationSettings(Settings):
         Families in the order of the motion (`runtime.loop.trajectories`).
     poses : int or None
         Number of static poses to search instead of a motion, for `signals.reader: static`
-        (`runtime.excitation.poses`); null: search a motion.
+        (`runtime.excitation.poses`); null: search for a motion.
     criterion : str
         record, cond, logdet or sigma; auto: record if there is a record, else cond. record is the
         largest ratio of the predicted %sigma of a parameter to its %sigma with the motion of the

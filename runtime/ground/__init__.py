@@ -1,1 +1,3 @@
-"""What every room stands on: errors, settings, limits, arrays, tables, JSON, parts of a report."""
+"""Basis of all other folders of `runtime`: errors, settings, limits, arrays, tables, JSON, parts of
+a report.
+"""

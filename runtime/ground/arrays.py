@@ -4,7 +4,8 @@
                         ragged lists
 
 Every array of a caller is converted here, because NumPy casts without a warning: a datetime64 would
-become nanoseconds, a complex number would lose its imaginary part, a masked array its mask.
+become nanoseconds, a complex number would lose its imaginary part, and a masked array would lose
+its mask.
 """
 
 from __future__ import annotations

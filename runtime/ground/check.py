@@ -39,14 +39,15 @@ class Check:
         What to do if the answer is not good.
     ahead : bool
         Whether the finding is printed before the values of the parameters, because most of these
-        values mean nothing then.
+        values are then meaningless.
     change : mapping of str to value
         The remedy as a change of the study, if there is such a change: {"record.units.q": "deg"}.
         Entries under record.scale are factors, one per joint, on the present scale.
     explains : float
         Share of the unexplained torque of a joint that the remedy takes away; 0 if it is unknown.
     outcome : bool
-        Whether the question is about a result, such as an error, not about what may cause it.
+        Whether the question is about a result, such as an error, not about a possible cause of the
+        result.
     """
 
     question: str
@@ -124,8 +125,8 @@ class Question:
 def worst_of(checks: Sequence[Check]) -> Check | None:
     """Return the check to name first; None if no check is "doubtful" or "no".
 
-    It is the first check of the worst state, unless another explains more: one of the same state,
-    or any one if the first is about a result only.
+    The result is the first check of the worst state, unless another check explains more: a check of
+    the same state, or any check if the first is about a result only.
     """
     worst = next((c for state in WORST[:2] for c in checks if c.state == state), None)
     if worst is None:
@@ -140,7 +141,7 @@ def worst_of(checks: Sequence[Check]) -> Check | None:
 def first_names(names: Sequence[str]) -> str:
     """List the first few names as text, and count the rest: "M1, MX2 and 3 more".
 
-    LIMIT.PARAMETERS_NAMED is the largest number of listed names.
+    The largest number of listed names is PARAMETERS_NAMED in limits.toml.
     """
     more = len(names) - LIMIT.PARAMETERS_NAMED
     listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])

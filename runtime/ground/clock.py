@@ -144,7 +144,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
 def resolution(t: Array) -> float:
     """Return the coarsest decimal unit, 1 s ... 1e-6 s, of which all steps of t are multiples.
 
-    It is 0 if there is none: the stamps are not rounded.
+    The result is 0 if there is no such unit, because the stamps are not rounded.
     """
     for k in range(7):
         multiples = (t - t[0]) * 10.0**k
@@ -159,8 +159,9 @@ def counted_rate(t: Array) -> float | None:
         t_k = t_0 + k / rate + e_k,   |e_k| up to the resolution of the stamps, in each piece
                                       between gaps and steps back
 
-    The rate is that of the least squares over all pieces, taken as a whole number of Hz where the
-    rounding of the stamps does not tell them apart. Nine tenths of the samples must be in pieces.
+    The rate comes from least squares over all pieces. It is rounded to a whole number of Hz if the
+    rounding of the stamps does not distinguish the two numbers. Nine tenths of the samples must be
+    in pieces.
     """
     step = np.diff(t)
     u, period = resolution(t), float(np.median(step[step > 0]))

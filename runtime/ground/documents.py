@@ -1,9 +1,9 @@
 """Conversion of results to JSON, first to mappings of plain values, then to text; and reading of
 results from JSON, with a check of every value.
 
-A result has its kind and version in the key `schema`. Another kind, another version and a damaged
-file each raise one clear error. Unknown keys are ignored, so that a later version can add keys
-under the same `schema`.
+A result has its kind and version in the key `schema`. A result of another kind or version and a
+damaged file each raise one clear error. Unknown keys are ignored, so that a later version can add
+keys under the same `schema`.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     try:
         data = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as e:
-        raise InputError(f"not JSON: {e}", file=file) from e
+        raise InputError(f"the text is not JSON: {e}", file=file) from e
     given = data.get("schema") if isinstance(data, dict) else None
     if not isinstance(given, str) or given.partition("/")[0] != schema.partition("/")[0]:
         raise InputError(

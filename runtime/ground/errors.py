@@ -136,6 +136,6 @@ class DataUnavailableError(InputError):
 def instant(t: float) -> str:
     """Write a time in s as text for messages: six digits, or down to milliseconds from 1e5 s.
 
-    Time stamps that count from an epoch such as 1970 are that large.
+    Only time stamps that count from an epoch such as 1970 exceed 1e5 s.
     """
     return f"{t:g}" if abs(t) < 1e5 else f"{t:.3f}"

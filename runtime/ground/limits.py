@@ -22,7 +22,7 @@ def entries(package: str) -> dict[str, dict[str, Any]]:
 
 @cache
 def limits(package: str) -> Any:
-    """Return the limits of a feature, and those that several rooms share, as attributes."""
+    """Return the limits of a feature, and the limits that several folders share, as attributes."""
     known = entries("runtime.ground") | entries(package)
     return SimpleNamespace(**{name: limit["value"] for name, limit in known.items()})
 

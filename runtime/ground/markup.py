@@ -1,4 +1,4 @@
-"""Names, formulas and numbers in HTML, with indices, exponents and units as in print.
+"""Names, formulas and numbers in HTML, with indices, exponents and units set as in a book.
 
 The parameter ZZ1R is printed as ZZ with the index 1R, and `D3**2*(M3 + M4)` with an exponent and no
 star. Every text passes through `element`, which escapes whatever is not Markup already: no name and

@@ -1,4 +1,6 @@
-"""Tell of large work before it is begun, and refuse it in one sentence if the memory is too small."""
+"""Announce a computation that needs much memory before it begins, and refuse it in one sentence if
+the memory is too small.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,13 @@ CONTAINER = Path("/sys/fs/cgroup")
 
 
 def require_memory(needed: float, what: str, remedy: str) -> None:
-    """Check that `needed` bytes of memory are available; from LIMIT.MEMORY_TOLD they are also told.
+    """Check that `needed` bytes of memory are available; report a need above MEMORY_TOLD in
+    limits.toml.
 
-    what : what needs them, such as "the rows of the records". remedy : what to do, for the message.
+    what : object that needs the memory, such as "the rows of the records". remedy : what to do, for
+        the message.
 
-    MemoryTooSmallError, with both numbers and the remedy, if less is available.
+    If less is available, a MemoryTooSmallError gives both numbers and the remedy.
     """
     if needed < SMALL:
         return
@@ -39,8 +43,9 @@ def require_memory(needed: float, what: str, remedy: str) -> None:
 def available_memory() -> float:
     """Return the bytes of memory that a process can still take, swap space included.
 
-    It is what Linux tells, less if a container has a limit; elsewhere all memory of the machine,
-    or infinity where a system does not tell.
+    On Linux, the number is that of the system, or the limit of a container if that is smaller. On
+    other systems, it is the whole memory of the machine, or infinity if the system does not report
+    it.
     """
     return min(_of_machine(), _of_container())
 
@@ -59,7 +64,7 @@ def _of_machine() -> float:
 
 
 def _of_container() -> float:
-    """Bytes up to the limit of the container of this process; infinity without one."""
+    """Bytes up to the limit of the container of this process; infinity without a limit."""
     try:
         limit = int((CONTAINER / "memory.max").read_text("ascii"))
         stat = (CONTAINER / "memory.stat").read_text("ascii").splitlines()

@@ -1,7 +1,7 @@
 """Result of a further analysis of an identification: its texts, tables, figures and checks.
 
-Code that prints, judges, exports or reports an identification uses all its parts alike, and no part
-by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
+Code that prints, judges, exports or reports an identification treats all its parts in the same way,
+and mentions no part by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ class Figure:
     columns : int
         Largest number of panels in a row.
     cell : (float, float), inch
-        Width and height of a panel; `extra` is added to the height of all, and the whole is at
-        least `least` wide.
+        Width and height of a panel; `extra` is added to the height of the figure, and the figure is
+        at least `least` wide.
     legend : int
         Number of columns of the common legend above the panels, whose letters have `letters`
         points; 0: no legend.
     logarithmic : bool
         Whether both axes of every panel are logarithmic.
     x, y : str
-        Labels of all panels together; numbers are then at the outer panels only.
+        Labels of all panels together; numbers then stand at the outer panels only.
     """
 
     caption: str
@@ -82,7 +82,7 @@ class Part:
     title : str
         Heading of its section.
     about : "record", "prediction" or "values"
-        Subject of its questions. Questions about the record are the first in a verdict, because an
+        Subject of its questions. A verdict begins with the questions about the record, because an
         error of the record causes later errors.
     """
 

@@ -16,7 +16,7 @@ LOGGER = logging.getLogger("runtime.ground.progress")
 
 @dataclass
 class Work:
-    """Count of the finished parts of long work, whose number shows only while it is done.
+    """Count of the finished parts of long work; their number is not known in advance.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Work:
     done: int = 0
 
     def begin(self, parts: int) -> None:
-        """Begin a stage, of `parts` of those that were expected later."""
+        """Begin a stage that has `parts` of the parts expected later."""
         self.later, self.left = self.later - parts, parts
         self.advance(0)
 
@@ -47,7 +47,7 @@ class Work:
             self.tell(self.done, self.done + self.left + self.later)
 
     def end(self) -> None:
-        """End a stage, whatever was expected of it."""
+        """End a stage, even if some of its expected parts were not needed."""
         self.left = 0
         self.advance(0)
 

@@ -7,8 +7,9 @@
     structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
 
 A number may be an arithmetic text (`2*pi/10000`) of numbers, pi, the operators + - * / ** and
-parentheses. It is parsed to a syntax tree, and the tree is evaluated; no text is ever executed as
-code. One value means a list of one. An integer is accepted where a text is expected.
+parentheses. The text is parsed to a syntax tree, and the tree is evaluated; no text is ever
+executed as code. A single value means a list of one value. An integer is accepted where a text is
+expected.
 """
 
 from __future__ import annotations
@@ -297,7 +298,8 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
     Raises
     ------
     SettingsError
-        For unknown keys, other types and values out of range, with the path of the key.
+        The mapping has unknown keys, values of a wrong type or values out of range; the error gives
+        the path of the key.
     """
     try:
         return _adapter(cls).validate_python(value)  # type: ignore[arg-type, no-any-return]

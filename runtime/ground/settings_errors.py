@@ -1,7 +1,7 @@
 """Conversion of an error of pydantic to one SettingsError: value, expected values and keys.
 
-pydantic finds such errors in settings and in JSON results. Removed or misplaced settings of a study
-file have sentences of their own, on the replacement.
+pydantic finds such errors in settings and in JSON results. For a removed or misplaced setting of a
+study file, a sentence names the replacement.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ def settings_error(error: ValidationError, given: Any, path: Path = ()) -> Setti
 def _problem(details: ErrorDetails, given: Any) -> tuple[Path, str]:
     """Return the keys of the setting in which pydantic found an error, and the reason as text.
 
-    The path has the keys of `loc` without the members of unions, which are not keys.
+    The keys are those of pydantic's location `loc`, without its names of members of union types,
+    which are no keys.
     """
     path: Path = ()
     for key in details["loc"]:

@@ -1,7 +1,7 @@
 """A table of texts, printed as aligned text, in a notebook as HTML, or on the page of a report.
 
 The parameters of an Estimate are also written in LaTeX, like Table 2 of the chapter (package
-booktabs). No name, unit or label is interpreted as LaTeX: a text without one of the known forms
+booktabs). No name, unit or label is interpreted as LaTeX: a text that has none of the known forms
 below is escaped, character by character.
 """
 
@@ -119,7 +119,7 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
 
 
 def in_lines(cells: Sequence[str]) -> list[str]:
-    """Pad cells of text to equal width, and join them into lines of at most LINE characters."""
+    """Pad cells of text to equal width, and join them into lines of at most 80 characters."""
     width = max(map(len, cells), default=0) + 2
     many = max((LINE + 2) // width, 1)
     rows = [cells[k : k + many] for k in range(0, len(cells), many)]

@@ -1,9 +1,9 @@
 """Fit of the nonlinear constants (scalars) of laws, such as the velocity of a Stribeck law.
 
-The fit is the one of `runtime.laws.projection`; other local minima are reported. Standard
-deviations are computed for X and the scalars together, from the linear problem with the columns [W,
-(dW/da) X], with blocks of time as independent. A law is useful if it improves the prediction of
-blocks of time that were not used in the fit.
+`runtime.laws.projection` makes the fit; other local minima are reported. Standard deviations are
+computed for X and the scalars together, from the linear problem with the columns [W, (dW/da) X],
+with blocks of time as independent. A law is useful if it improves the prediction of blocks of time
+that were not used in the fit.
 """
 
 from __future__ import annotations
@@ -164,13 +164,13 @@ class FittedLaws(Part):
 def fitted_scalars(problem: Problem) -> Problem:
     """Fit the nonlinear constants of laws, such as a Stribeck velocity; set them in the model.
 
-    A step of the identification. Without scalars (`fit:` of the robot file) or records, the problem
-    is returned unchanged.
+    This is a step of the preparation of a problem. Without scalars (`fit:` of the robot file) or
+    records, the problem is returned unchanged.
 
     Raises
     ------
     InputError
-        If the method simulates the loop, since it uses the scalars of the file.
+        The method simulates the loop, and would use the scalars of the robot file.
     """
     if not problem.records or not hasattr(problem.model, "FIT"):
         return problem

@@ -1,12 +1,12 @@
-"""Columns of W that depend on the torque transmitted at their joint, as load-dependent friction.
+"""Columns of W that depend on the torque transmitted at their joint, such as load-dependent friction.
 
-An example is load-dependent friction. Such a model is bilinear in the parameters,
+A model with such columns is bilinear in the parameters,
 
     Y = D_r X_r + D_l(tau_m) X_l + rho,        tau_m = D_r X_r
 
 with D_l the columns of these laws and D_r all other columns. The parameters are estimated by least
-squares with tau_m of the estimate before, repeated until tau_m no longer changes. The measured
-torque cannot replace tau_m: its noise would enter D_l and bias X_l.
+squares with tau_m of the previous estimate, until tau_m no longer changes. The measured torque
+cannot replace tau_m: its noise would enter D_l and bias X_l.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 def transmitted_torque(problem: Problem) -> Problem:
     """Add to the records the torque that each joint transmits, if columns of W depend on it.
 
-    A step of the identification. Without such laws, or without records, the problem is returned
-    unchanged.
+    This is a step of the preparation of a problem. Without such laws, or without records, the
+    problem is returned unchanged.
 
     Raises
     ------
     InputError
-        If the torque does not converge.
+        The transmitted torque does not converge.
     """
     model = problem.model
     read = {c: names for c, names in channels_of(model).items() if c.startswith(TRANSMITTED)}
@@ -95,7 +95,8 @@ def _solve(observations: Sequence[Observation], weights: bool) -> Array:
 class TransmittedTorque:
     """Computation of the torque tau_m that a joint transmits, from columns of W without tau_m.
 
-    `read` lists, by channel of tau_m, the parameters whose columns depend on this channel.
+    `read` lists, for the channel of each tau_m, the parameters whose columns depend on this
+    channel.
     """
 
     def __init__(self, model: GeneratedModel, read: dict[str, tuple[str, ...]]) -> None:

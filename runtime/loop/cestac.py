@@ -4,7 +4,7 @@ The loop serves methods that simulate it (iv, didim), and encoders inside the lo
 
     place: record
             the positions of the record are rounded; the loop is simulated without steps, as the
-            method does on any record
+            method does with any record
     place: loop
             every run is a record simulated anew; the encoder in the loop has steps of Delta, and a
             random phase phi for each encoder:
@@ -58,8 +58,8 @@ class Loop:
     Attributes
     ----------
     problem : Problem
-        Problem with the median of settings.cestac in its signals. With place: loop, its records
-        serve only as source of the reference.
+        Problem with the median of settings.cestac in its signals. With place: loop, the records of
+        the problem serve only as source of the reference.
     simulator : Simulator
         Simulator whose control law has the encoder of the settings, not the steps of the study.
     """
@@ -76,7 +76,7 @@ class Loop:
 
     @property
     def in_loop(self) -> bool:
-        """Whether the encoder of the study is the one in the loop (place: loop)."""
+        """Whether the encoder of the study is inside the simulated loop (place: loop)."""
         return bool(self.study.cestac.place == "loop")
 
     @property
@@ -180,7 +180,7 @@ class Loop:
         """Return the control loop that simulates a record with the encoder step of a study level.
 
         If the step level.delta is 0, the encoder is that of the study. draw : numbers of the run;
-        the last sets its seed.
+        the last number sets its seed.
         """
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
@@ -197,8 +197,8 @@ class Loop:
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
         """Simulate a record with `simulator`, and make the closed loop of this record.
 
-        The closed loop itself is simulated with the encoder of the settings. The reader
-        is told the step; without any step, the positions are exact.
+        The simulated controller sees the encoder of the settings. The identification reads the
+        positions with the encoder step of the study, or exact positions if there is no step.
         """
         record = simulator.run(
             self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"
@@ -220,7 +220,8 @@ def _loop(problem: Problem) -> Loop:
 def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
     """Make the closed loop of a study of encoder resolution; None if the study simulates none.
 
-    simulator : default: made from the section `controller`; SettingsError if that is missing.
+    simulator : default: the simulator of the section `controller`; raise SettingsError if this
+      section is missing.
     """
     study: Any = problem.settings
     in_loop = study.cestac.place == "loop"

@@ -16,12 +16,13 @@ position error and torque: the bandwidth of the simulated loop stays that of the
 is far from the truth. Rows are chosen by the velocity of the reference, never by that of the
 measured positions: a choice that depends on noise biases every method. Slow rows of joint j
 (`rows.low_speed`) are rows where a dry friction that acts on the joint slips slowly (coupled
-friction of a wrist included): at rest its torque is anything between -FS and FS, not W X, and the
-decimation spreads that into the rows near them (`rows.around`). Instants with the torque at its limit are left out.
+friction of a wrist included): at rest the torque of such friction is anything between -FS and FS,
+not W X, and the decimation spreads the difference into the neighbouring rows (`rows.around`).
+Instants with the torque at its limit are left out.
 
 If the reference is not known (`reference: measured`), the measured motion through the filters
-replaces it: then the instruments contain the noise of the same run, and DIDIM is output error about
-the measured motion itself. The Estimate states this.
+replaces it: the instruments then contain the noise of the same run, and DIDIM is output error about
+the measured motion itself. The Estimate states this assumption.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel, axes_of, joint_labels
+from runtime.core.model import GeneratedModel, joint_labels, require_no_axes
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import LoopRows, Observation, stack
@@ -70,8 +71,8 @@ class LoopOptions(Settings):
     Attributes
     ----------
     reference : str
-        known (from the settings, or from the columns qr1 ... of each record), or measured: the
-        measured motion replaces a reference that is not known.
+        known: the reference comes from the settings, or from the columns qr1 ... of each record.
+        measured: the measured motion replaces an unknown reference.
     """
 
     reference: Literal["known", "measured"] = "known"
@@ -247,14 +248,11 @@ class ClosedLoop:
 def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
     """Build the system Y = W X + rho of all records, together with the closed loop to simulate.
 
-    Methods that simulate the loop need this. simulator : default: made from the section
-    `controller` of the settings; without this section no loop is attached.
+    Methods that simulate the loop need the result. simulator : default: the simulator of the
+    section `controller` of the settings; without this section, no loop is attached.
     """
     settings: Any = problem.settings
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(
-            f"estimate.method: {settings.estimate.method} does not support {axes[0]}; use another method, or identify {axes[1]}"
-        )
+    require_no_axes(problem.model, f"estimate.method: {settings.estimate.method}")
     if simulator is None and settings.controller is not None:
         from runtime.loop.simulation import Simulator as FromController
 
@@ -384,7 +382,7 @@ def slips(qd: Array, G: Array) -> Array:
 def _usable(simulator: Simulator, record: Record) -> Array | None:
     """Select the samples whose torque is below its limit, and that are not near a long gap.
 
-    A gap is a time without measured positions. None: all samples.
+    A gap is a time without measured positions. The result None means all samples.
     """
     bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
     if not np.isfinite(bound).any() and record.missing is None:
@@ -400,7 +398,7 @@ def _usable(simulator: Simulator, record: Record) -> Array | None:
 def loop_of(observation: Observation, method: str) -> ClosedLoop:
     """Return the closed loop that was stored with the system Y = W X + rho of an observation.
 
-    SettingsError if there is none; the message names `method`, which needs the loop.
+    Raise SettingsError if no loop is stored; the message names `method`, which needs the loop.
     """
     if observation.closed_loop is None:
         raise SettingsError(

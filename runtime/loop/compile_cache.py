@@ -51,7 +51,7 @@ def shared_object(
 ) -> ctypes.CDLL:
     """Load the compiled library of a C file from the cache, or compile the file first.
 
-    A library that does not open is compiled again, once.
+    A library that does not open is compiled once more.
 
     Parameters
     ----------
@@ -101,7 +101,8 @@ def shared_object(
 
 
 def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
-    """Open the compiled library that the cache holds for the hash `key`; None if there is none.
+    """Open the compiled library that the cache holds for the hash `key`; None if there is no such
+    file.
 
     Files that are damaged or do not open are removed.
     """
@@ -125,7 +126,7 @@ def _compiled(
         if done.returncode or not target.is_file():
             first = next(iter(done.stderr.strip().splitlines()), "no message")
             raise NotCompiledError(
-                f"the compiler {' '.join(command)} failed with {done.returncode}: {first}"
+                f"the compiler {' '.join(command)} failed with exit code {done.returncode}: {first}"
             )
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)
@@ -135,7 +136,7 @@ def _compiled(
 def compiler() -> tuple[tuple[str, ...], str]:
     """Find the C compiler; return its command and its version text.
 
-    NotCompiledError if there is no compiler, or if it cannot be used.
+    Raise NotCompiledError if there is no compiler, or if it cannot be used.
     """
     given = shlex.split(os.environ.get("CC", ""))
     program = (
@@ -159,7 +160,7 @@ def compiler() -> tuple[tuple[str, ...], str]:
 
 
 def _ran(words: Sequence[str], folder: str | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the compiler in a folder; NotCompiledError if the compiler does not run or not end."""
+    """Run the compiler in a folder; raise NotCompiledError if the compiler does not run or not end."""
     try:
         return subprocess.run(
             words,

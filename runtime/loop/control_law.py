@@ -8,8 +8,8 @@
     cascade  P = kv kp    Vr = kv cv    Vm = kv       K = ki   Ie = kp   Ir = cv   Im = 1
 
 P, Vr, Vm and K are multiplied by the gain of the drive. g multiplies everything between position
-error and torque, the saturation too: with g_j = J_j(X)/J_j(reference), a simulation with other
-parameters keeps the bandwidth of the real loop.
+error and torque, including the saturation: with g_j = J_j(X)/J_j(reference), a simulation with
+other parameters keeps the bandwidth of the real loop.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class ControlLaw:
     def matrix(self, g: Array, *, ideal: bool) -> Array:
         """Arrange gains, limits and quantisation steps of the law in a matrix, one row per joint.
 
-        g : factor on the torque, shape (n,). ideal : encoder and converter have no steps.
+        g : factor on the torque, shape (n,). ideal : whether encoder and converter have no steps.
         """
         vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
         if ideal:
@@ -116,7 +116,7 @@ class ControlLaw:
 def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
     """Convert the settings of a controller into a control law for the joints of a model.
 
-    SettingsError if the settings do not fit the model.
+    Raise SettingsError if the settings do not fit the model.
     """
     n, law = len(model.JOINTS), controller.law
 

@@ -70,7 +70,8 @@ def tick_function(
 
     x : q, qd, y1, y2, I, u.
     signals : q_r, qd_r, feed-forward, encoder noise, disturbance.
-    law : (n, columns) of `VECTORS`, then R, R^-1 and offset of the encoder.
+    law : the settings of the control law in `VECTORS`, one column each, shape (n, columns), then R,
+        R^-1 and offset of the encoder.
     flags : T, delay, weights of the two differences.
     """
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
@@ -240,8 +241,8 @@ def round_function(
 def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
     """Make the symbolic inputs of the functions that move the arm: state, torques, parameters.
 
-    They are q, qd, tau, Xs, plus, minus, h. Xs : parameters without dry friction; plus, minus :
-    largest friction forces in each direction; h : time step. Without dry friction, plus and minus
+    The inputs are q, qd, tau, Xs, plus, minus, h. Xs : parameters without dry friction; plus, minus
+    : largest friction forces in each direction; h : time step. Without dry friction, plus and minus
     are empty.
     """
     n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
@@ -303,7 +304,7 @@ def _cvodes(model: GeneratedModel) -> Any:
 def compiled(function: Any, cache: Path | None = None) -> Any:
     """Compile a CasADi function as C code, or load its compiled form from the cache.
 
-    If this fails, the result is the function itself, with a FallbackWarning.
+    If the compilation fails, the result is the function itself, with a FallbackWarning.
     """
     generator = ca.CodeGenerator(f"{function.name()}.c")
     generator.add(function)

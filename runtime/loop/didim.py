@@ -5,10 +5,10 @@ The measured torques are fitted with the regressor of the simulated motion:
     X^(k+1) = argmin sum_j ||Y_j - Z_j^k X||^2 / s_j^2,
             Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k
 
-DIDIM needs the measured torque and the reference, and of the measured positions only the first. Z
+DIDIM needs the measured torque, the reference, and only the first of the measured positions. Z
 passes through the decimation only, because simulated states are exact. DIDIM is an output-error
-method on the torque whose Jacobian leaves out the loop (the loop holds q_s near q_r).
-C = (Z'VZ)^-1. The residual is computed with the simulated motion. It is larger than the residual of
+method on the torque whose Jacobian leaves out the loop (the loop holds q_s near q_r). C =
+(Z'VZ)^-1. The residual is computed with the simulated motion. This residual is larger than that of
 IV with the same X, because Z does not contain the motion that effects outside the model cause.
 
 Reference: Gautier, Janot and Vandanjon (2013).
@@ -38,7 +38,7 @@ def fit(start: Beginning) -> Fitted:
     """Fit the parameters by method DIDIM, which simulates the closed loop in each pass.
 
     `details` holds the list of passes, and the contraction (ratio of the last two changes of X).
-    SettingsError if no loop is attached to the observation.
+    Raise SettingsError if no loop is attached to the observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
 

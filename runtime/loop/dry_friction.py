@@ -43,7 +43,8 @@ def dry_friction(model: GeneratedModel) -> DryFriction:
     """Find the Coulomb friction elements of a model from values of its regressor.
 
     A column of the regressor belongs to dry friction if it is zero at rest, and if it is the same
-    at velocities qd and 2 qd. Such a column is G' sign(G qd), or one side of it.
+    at velocities qd and 2 qd. Such a column is G' sign(G qd), or its part of one direction of
+    motion.
     """
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     rng = np.random.default_rng(1)

@@ -1,14 +1,14 @@
 """Fixed-point iteration of IV and DIDIM: estimate and simulate in turn until X no longer changes.
 
-    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it no
+    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until X no
     longer changes; then again with g = 1
 
 The gains g refer to X_ref, which is not the truth, so that the last passes need g = 1. A parameter
 vector whose loop cannot be simulated (inertia not positive definite, unstable) is refused: the step
 towards it is halved, at most five times. The iteration stops if max |dX_i|/sigma_i < 0.1 and the
-norm of the residual changes by less than 1e-3 of itself, or if the change is rounding. If the loop
-is loose, passes of DIDIM overshoot: from the third pass on, the steps are those of Anderson (1965),
-f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last differences,
+norm of the residual changes by less than a thousandth, or if only rounding errors change it. If the
+control of the loop is soft, passes of DIDIM overshoot: from the third pass on, the steps are those
+of Anderson (1965), f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last differences,
 X^(k+1) = X^k + f_k - (dX + dF) gamma.
 """
 
@@ -46,9 +46,10 @@ class FixedPointOptions(LoopOptions):
     ----------
     start : str or mapping of float
         X^0: ols, values of the robot file, unit (motor inertia, else inertia or mass of the own
-        link, 1 for every joint; all others 0), or parameters by name, the others 0.
+        link, 1 for every joint; all others 0), or parameters by name, with all others 0.
     gains : str
-        X_ref of g: ols, values, start, or one (no rescaling).
+        Parameters X_ref from which the gain rescaling g is computed: ols, values, start, or one (no
+        rescaling).
     passes : int
         Largest number of passes with rescaled gains, and with g = 1.
     change : float
@@ -191,7 +192,7 @@ def iterate(
 
 
 def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
-    """Write advice: which start values to set if the iteration starts from unphysical ones.
+    """Advise which start values to set if the iteration starts from unphysical parameters.
 
     The advice is the values of the robot file if they give a positive inertia about every joint,
     else the parameters of method feasible.
@@ -220,7 +221,7 @@ def _simulated(
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
     """Simulate the closed loop with X; if this fails, try X nearer to the last X that succeeded.
 
-    Each further try halves the distance.
+    Each further attempt halves the distance.
 
     Returns X, the gains g, the runs, and the reason if no simulation was possible. remedy : advice
     in the error if the first simulation fails.

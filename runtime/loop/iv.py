@@ -9,10 +9,10 @@ noise, so that Z'V rho has mean zero. A bias that W and Z share, such as the eff
 on sign(qd), remains. The system is solved with the columns of W and Z scaled alike.
 
 `details` : trail; smallest correlation between the spaces of Z and W (1: the instruments explain
-W); condition of Z'VW with unit columns; the Hausman test on d = X_IV - X_WLS. The covariance C_d of
-d comes from blocks of residuals, as for sigma_corrected. The test gives the largest |d_i|/sigma_di
-with its name and, if there are blocks enough, d'C_d^-1 d, about chi2(b) if least squares is
-unbiased.
+  W); condition of Z'VW with unit columns; the Hausman test on d = X_IV - X_WLS. The covariance C_d
+  of d comes from blocks of residuals, as for sigma_corrected. The test gives the largest
+  |d_i|/sigma_di with its name and, if there are enough blocks, d'C_d^-1 d, whose distribution is
+  about chi2(b) if least squares is unbiased.
 
 References: Janot, Vandanjon and Gautier (2014); Hausman (1978).
 """
@@ -49,7 +49,7 @@ ROUNDING = (
 def fit(start: Beginning) -> Fitted:
     """Estimate the parameters by method IDIM-IV, with W computed from the measured positions.
 
-    SettingsError if no loop is attached to the observation.
+    Raise SettingsError if no loop is attached to the observation.
     """
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
     raw = start.system.raw

@@ -7,8 +7,8 @@
     factor    of tau_law nearest to tau: 1 if gains and units are those of the record
     delay     of tau against tau_law with the largest share, s
 
-If a law explains little, it is not the law of the record, whatever the simulation with it gives:
-gains may be in other units or on the motor side, there may be a delay or another reference.
+A law that explains little is not the law of the record, even if a simulation with this law fits:
+gains may be in other units or on the motor side, or there may be a delay or another reference.
 
 If the record is slower than the controller, the differences qd_m are those of the record.
 """
@@ -40,9 +40,9 @@ class LawFit:
     ----------
     joint : str
     share : float, %
-        Share of the torque that the law explains; below 0: nothing.
+        Share of the torque that the law explains; below 0 if the law explains nothing.
     factor : float
-        Factor on the torque of the law with which it is nearest to the recorded torque.
+        Factor that brings the torque of the law nearest to the recorded torque.
     delay : float, s
         Delay at which the share is largest.
     best : float, %
@@ -86,7 +86,8 @@ def law_torque(law: Any, record: Record, reference: Reference, controller: Contr
     """Compute the torque tau_law of the control law at the samples of a record, N m or N.
 
     The result has shape (N, n). If the loop settled before t = 0, the integrator starts at the
-    value that explains the torques of the first LIMIT.LAW_STEADY seconds; else it starts at 0.
+    value that explains the torques of the first moments (LAW_STEADY in limits.toml, s); else it
+    starts at 0.
     """
     N, T = len(record), 1 / record.rate
     q_r, qd_r, qdd_r = (

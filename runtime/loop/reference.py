@@ -1,6 +1,7 @@
 """References of a controller: positions q_r, velocities qd_r and accelerations qdd_r at its rate.
 
-They come from samples, from a motion given by coefficients, from a record, or from random points.
+A reference comes from samples, from a motion given by coefficients, from a record, or from random
+points.
 
     reference = Reference.sampled(q_r, rate=1000)   # derivatives by central differences
     reference = Reference(rate, q, qd, qdd)
@@ -100,7 +101,8 @@ def reference_of(
 ) -> Reference:
     """Make the reference motion that the settings of a controller describe.
 
-    The reference must be within the limits of the robot, unless the settings say to ignore them.
+    The reference must be within the limits of the robot, unless the settings say that the limits
+    are ignored.
 
     Parameters
     ----------
@@ -164,7 +166,8 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 def read_reference(path: Path, rate: float, n: int) -> Reference:
     """Read a reference motion at `rate`, Hz, from the columns q1 ... qn of a file.
 
-    The columns qd1 ... and qdd1 ... are used if the file has them; else central differences.
+    The columns qd1 ... and qdd1 ... are used if the file has them; otherwise central differences
+    are used.
     """
     table = read_table(path)
     names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
@@ -193,8 +196,8 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
 def of_record(record: Record, controller: Controller) -> Reference:
     """Make the reference of a controller from the reference columns of a record.
 
-    If the record is slower than the controller, cubic splines interpolate. SettingsError if the
-    record holds no reference, or if its rate is not that of every `record_every`-th tick.
+    If the record is slower than the controller, cubic splines interpolate. Raise SettingsError if
+    the record holds no reference, or if its rate is not the rate of every `record_every`-th tick.
     """
     where, every = ("controller", "reference", "record"), controller.record_every
     if record.q_r is None:
@@ -236,7 +239,7 @@ def require_rate(record: Record, controller: Controller) -> None:
 def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[str]) -> None:
     """Raise InputError if a reference exceeds the limits of q, qd or qdd of the robot.
 
-    The message gives joint, value, limit and time of the first value outside.
+    The message gives joint, value, limit and time of the first value outside the limits.
     """
     for quantity, unit in UNITS.items():
         if quantity not in limits:

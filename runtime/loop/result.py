@@ -24,7 +24,7 @@ TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
 class SimulationError(InputError):
     """Error of a simulation: inertia not positive definite, loop unstable, reference not followed.
 
-    `time` : time of the reference at which this appears, s.
+    `time` : time of the reference at which the error appears, s.
     """
 
     def __init__(self, message: str, *, time: float) -> None:

@@ -57,8 +57,8 @@ class Law(Settings):
     kp : float or tuple of float
         Gain of the position; of a cascade in 1/s.
     kd : float or tuple of float or str
-        Gain of the velocity of a pid; fit: found with the parameters, from a record whose torque is
-        that of the law.
+        Gain of the velocity of a pid; fit: the gain is estimated together with the parameters, from
+        a record whose torque is that of the law.
     kv : float or tuple of float
         Gain of the velocity of a cascade.
     ki : float or tuple of float
@@ -71,7 +71,8 @@ class Law(Settings):
         Torque for one unit of u.
     delay : float or str, s
         Delay from the logged signals to the torque, for a law that replaces a measured torque; fit
-        (the default): found with the parameters. A simulated loop has controller.delay.
+        (the default): the delay is estimated together with the parameters. A simulated loop uses
+        controller.delay instead.
     antiwindup : float or tuple of float or None
         Largest |I|; null: unlimited.
     """
@@ -96,8 +97,9 @@ class Law(Settings):
     def gains(self, n: int) -> dict[str, np.ndarray]:
         """Return the gains P (position error), Vr, Vm (reference, measured velocity), K (integral).
 
-        They are those of u = P e + Vr qd_r - Vm qd_m + K I, shape (n,) each, and contain the gain
-        of the drive: N m or N per unit of e, of its rate, and of I. kd: fit counts as 0.
+        The law is u = P e + Vr qd_r - Vm qd_m + K I. Each gain has the shape (n,) and contains the
+        gain of the drive: N m or N per unit of e, of its rate, and of I. With kd: fit, kd counts as
+        0.
         """
 
         def each(key: str) -> np.ndarray:
@@ -164,7 +166,7 @@ class Torque(Settings):
     def largest(self, limits: Mapping[str, Any]) -> PerJoint[float] | None:
         """Return the largest joint torque, N m or N, from the settings or the limits of the model.
 
-        None if the torque is unlimited.
+        The result is None if the torque is unlimited.
         """
         if self.saturation != "limits":
             return self.saturation
@@ -174,7 +176,7 @@ class Torque(Settings):
 class Points(Settings):
     """Settings of a motion between random points in the middle of the range of each joint.
 
-    The motion is as fast as the limits of the robot file allow.
+    The speed of the motion is the largest that the limits of the robot file allow.
 
     Attributes
     ----------
@@ -197,7 +199,7 @@ class ReferenceSettings(Settings):
         CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m;
         missing derivatives are computed by differences.
     record : int or None
-        Index, from 0, of a record that holds its reference, columns qr1 ...
+        Index, from 0, of a record that contains its own reference in the columns qr1 ...
     motion : mapping or None
         Parts with their coefficients, as `runtime.loop.trajectories.motion_from_mapping` reads
         them.
@@ -236,7 +238,8 @@ class Controller(Settings):
     delay : int
         Ticks from measurement to torque, 0 or 1.
     velocity : str
-        qd_m as the difference of two positions, or averaged, (q_k - q_(k-2))/2T.
+        Computation of qd_m: difference of two successive positions, or averaged, (q_k -
+        q_(k-2))/2T.
     feedforward : str
         none; values adds the torque of the reference with the parameters of the robot file; record
         adds the recorded feed-forward torque, `record.columns.tau_ff`.

@@ -6,8 +6,9 @@
             100 %: the reference predicts the motion as well; only if the reference is known
     torque      100 ||tau_s - tau||/||tau||           decimated, on the rows of the observation
 
-If the simulated motion is not the measured motion, Z, or the output error, belongs to another
-experiment: then a small residual does not concern this robot. The limits are conventions.
+If the simulated motion differs from the measured motion, the instruments Z (or the output error)
+belong to another experiment, and a small residual says nothing about this robot. The limits are
+conventions.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def simulated_motion(
 ) -> tuple[JointMotion, ...]:
     """Simulate the records with base parameters X, and compare the motion of each joint.
 
-    X has shape (b,). InputError if the simulation is not possible.
+    X has shape (b,). Raise InputError if the simulation is not possible.
     """
     runs = loop.run(X)
     gaps = [
@@ -166,7 +167,7 @@ def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitte
 def simulating_method(fit: Callable[[Beginning], Fitted], rounding: str) -> Method:
     """Make the Method of an estimator that simulates the closed loop of the records.
 
-    rounding : its sentence on a study that rounds recorded positions.
+    rounding : sentence of the method on a study that rounds recorded positions.
     """
     return Method(
         FixedPointOptions,

@@ -7,8 +7,8 @@
 The torque is held between the ticks of the controller. The motion between ticks is integrated by
 Runge-Kutta of order 4 (or CVODES), with dry friction that holds at rest and only takes energy.
 Substeps are at most `pole_step` over the fastest pole of the loop. Before a run, the inertia matrix
-must be positive definite and the sampled loop stable along the reference; else SimulationError
-names the place and what to try.
+must be positive definite and the sampled loop stable along the reference; otherwise a
+SimulationError names the place and a remedy.
 """
 
 from __future__ import annotations
@@ -166,8 +166,8 @@ class Simulator:
     def substeps(self, X: Array, reference: Reference, g: Array) -> int:
         """Compute the integration steps per sampling period from the fastest closed-loop pole.
 
-        SimulationError if, on the reference, the inertia is not positive definite or the sampled
-        loop is unstable.
+        Raise SimulationError if, on the reference, the inertia is not positive definite or the
+        sampled loop is unstable.
         """
         fastest = 0.0
         for k in np.unique(np.linspace(0, len(reference) - 1, LIMIT.LOOP_POINTS).astype(int)):
@@ -205,7 +205,8 @@ class Simulator:
         return steps
 
     def _ticks(self, substeps: int) -> Any:
-        """Return the CasADi function that simulates BLOCK ticks, each in `substeps` integrations.
+        """Return the CasADi function that simulates one block of ticks, each in `substeps`
+        integrations.
 
         A tick is a sampling period of the controller. Each function is made once.
         """
@@ -217,7 +218,7 @@ class Simulator:
     def _iterated(
         self, x: Array, signals: Array, X: Array, law: Array, substeps: int
     ) -> tuple[Array, Array]:
-        """Simulate all sampling periods (ticks) of a run, in calls of BLOCK ticks each.
+        """Simulate all sampling periods (ticks) of a run, in blocks of ticks.
 
         Parameters
         ----------

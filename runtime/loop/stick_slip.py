@@ -7,11 +7,11 @@ c_plus,
             between them where s = 0,
 
 with h of the model without dry friction. At rest, the friction force keeps ds/dt = 0 if such a
-force lies between the bounds; else it is the bound itself. This is a linear complementarity
-problem, solved by block pivots.
+force lies between the bounds; else it is the bound itself. These conditions form a linear
+complementarity problem, solved by block pivots.
 
-A step ends where a slip changes its sign, and the slip is zero from there on: friction never pushes
-along the motion, so that it takes energy only.
+A step ends where a slip changes its sign, and the slip is zero from then on: friction never pushes
+along the motion, so that it only takes energy.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
 def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
     """Compute the forces of friction elements at rest, and in which direction each starts to slip.
 
-    Both have shape (m,); the direction is 0 if the element stays at rest. ds/dt = free - D f.
+    Both results have the shape (m,); the direction is 0 if the element stays at rest. ds/dt = free
+    - D f.
     """
     m = D.shape[0]
     resting = moving == 0

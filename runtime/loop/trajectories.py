@@ -75,7 +75,7 @@ class Family:
     def bounds(self) -> tuple[Array, Array]:
         """Return the smallest and the largest allowed values of the P coefficients p of a joint.
 
-        They are infinite for coefficients that only the limits of the motion restrict.
+        The bounds are infinite for coefficients that only the limits of the motion restrict.
         """
         return np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
 

@@ -13,7 +13,7 @@ Array = np.ndarray
 class Bound:
     """The module of `symgen.variants`, with other values of its constants by default.
 
-    Every other name is that of the module.
+    All other attributes are those of the module.
     """
 
     def __init__(self, model: Any, constants: Mapping[str, float]) -> None:

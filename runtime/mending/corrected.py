@@ -1,4 +1,4 @@
-"""The model of a study that corrects the robot: that of the corrected robot, and no other."""
+"""A study that corrects the robot needs the model of the corrected robot, and accepts no other."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from runtime.mending.settings import digest
 
 
 def corrected_model(problem: Problem) -> Problem:
-    """Check that the model is that of the robot which the study corrects; change nothing.
+    """Check that the model belongs to the robot as the study corrects it; change nothing.
 
     This is a step of the preparation of a problem.
 

@@ -4,8 +4,9 @@
     free_alpha3 ...                    robot.frames;  free_gx ...  robot.gravity
     the zero of joint j                robot.frames: {j: {theta: qj + theta_j + p}}
 
-On the side of the files, P and T are E_q = R P R^-1 and E_tau = R'^-1 T R' of motors, with R the
-gear ratio. A matrix E with one element in each row is an order of columns and factors of them.
+For files on the motor side, P and T become E_q = R P R^-1 and E_tau = R'^-1 T R', with R the gear
+ratio. A matrix E with one element in each row means an order of the columns, with a factor for
+each.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ DIGITS = 4
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """What the lines of a study depend on beside the study itself.
+    """Data on robot and records that decide how a correction is written into a study.
 
     Attributes
     ----------
@@ -71,9 +72,9 @@ class Place:
 
 
 def columns_in(model: GeneratedModel, folder: str | Path | None) -> Columns:
-    """Make the function that names the columns of a record: as stated, as its files have them, or q1 ...
+    """Make the function that names the columns of a record: as stated, as in its files, or q1 ...
 
-    folder : that of the files of the study.
+    folder : folder of the files of the study.
     """
 
     def columns(record: Lines) -> tuple[Sequence[str], Sequence[str]]:
@@ -100,8 +101,8 @@ def edited(
 ) -> Lines | None:
     """Write a study in which one error is corrected; None if no line of a study corrects it.
 
-    constants : entries of the table of frames and gravity with which the study is read, with those
-        of the cause.
+    constants : entries of the table of frames and gravity with which the study is read, including
+      those of the cause.
     """
     study = deepcopy(study)
     if cause.constants:
@@ -138,7 +139,7 @@ def _entry(key: str) -> tuple[str, int]:
 
 
 def with_variable(name: str, frame: int, value: float, place: Place) -> float | str:
-    """Write the entry of a frame; theta of a joint that turns and r of one that slides hold q."""
+    """Write the entry of a frame; theta of a revolute joint and r of a prismatic joint contain q."""
     text = angle_text(value) if name in ("alpha", "theta", "gamma") else f"{value:g}"
     own = place.joints.index(frame) if frame in place.joints else None
     if own is None or name != ("theta" if place.turning[own] else "r"):
@@ -169,7 +170,7 @@ def rounded(x: float) -> float:
 def monomial(E: Array) -> tuple[list[int], Array] | None:
     """Write a matrix as an order of columns and factors: row i is factors[i] at order[i].
 
-    None if a row has another number of elements than one.
+    Return None if a row does not have exactly one element.
     """
     large = np.abs(E) > 1e-9 * np.abs(E).max()
     if not ((large.sum(axis=0) == 1).all() and (large.sum(axis=1) == 1).all()):
@@ -233,7 +234,8 @@ def _ordered(record: Lines, key: str, order: list[int], place: Place) -> bool:
         if columns.get(other):
             columns[other] = [columns[other][k] for k in order]
     settings = [(record["units"], key), (record["scale"], key)]
-    settings.append((record, "counts_per_revolution" if key == "q" else "torque_constant"))
+    whole = ("counts_per_revolution",) if key == "q" else ("torque_constant", "delay")
+    settings += [(record, name) for name in whole]
     for section, name in settings:
         if isinstance(given := section[name], list) and len(given) == place.n:
             section[name] = [given[k] for k in order]
@@ -241,7 +243,9 @@ def _ordered(record: Lines, key: str, order: list[int], place: Place) -> bool:
 
 
 def _scaled(record: Lines, key: str, factors: Array, n: int) -> bool:
-    """Multiply the factors of the columns of a record; False if a name in the file gives them."""
+    """Multiply the factors of the columns of a record; return False if a name in the file gives
+    these factors.
+    """
     given = record["scale"][key]
     if isinstance(given, str):
         return False
@@ -251,7 +255,7 @@ def _scaled(record: Lines, key: str, factors: Array, n: int) -> bool:
 
 
 def _at_side(record: Lines, cause: Cause, place: Place) -> bool:
-    """Write another side of positions or torques; False if this is not what the cause changes."""
+    """Write another side of positions or torques; return False if the cause changes something else."""
     before, still = sides_of(record), np.eye(place.n)
     for key, side in cause.change.items():
         record[key.removeprefix("record.")] = side
@@ -261,15 +265,19 @@ def _at_side(record: Lines, cause: Cause, place: Place) -> bool:
 
 
 def _at_rate(record: Lines, cause: Cause, place: Place) -> bool:
-    """Write another unit of time, or another sampling rate in place of the time column."""
+    """Write a corrected unit of time, or a sampling rate in place of the time column.
+
+    A delay is a number of samples: its time becomes shorter as the rate becomes higher.
+    """
     unit = next((u for f, u in BEFORE_S.items() if np.isclose(f, cause.rate)), "")
     if place.timed and unit and record["units"]["t"] == "s":
         record["units"]["t"] = unit
-        return True
-    if record["resample"] is not None:
+    elif record["resample"] is not None:
         return False
-    record["rate"] = float(f"{cause.rate * (record['rate'] or place.rate):.10g}")
-    record["columns"]["t"] = None
+    else:
+        record["rate"] = float(f"{cause.rate * (record['rate'] or place.rate):.10g}")
+        record["columns"]["t"] = None
+    record["delay"] = _short(np.asarray(record["delay"], dtype=float) / cause.rate)
     return True
 
 
@@ -303,13 +311,18 @@ def _coupled(study: Lines, cause: Cause, place: Place) -> bool:
 _EDITS: dict[str, Callable[[Lines, Cause, Place], bool]] = {"side": _at_side, "rate": _at_rate}
 
 
-def delayed(study: Lines, delay: Array) -> Lines:
-    """Write the delay of the torques of each joint, s, in all records of a study."""
+def delayed(study: Lines, by: Array) -> Lines:
+    """Add to the delay of the torques of each joint, s, in all records of a study."""
     study = deepcopy(study)
-    values = [float(x) for x in delay]
     for record in records_in(study):
-        record["delay"] = values[0] if len({*values}) == 1 else values
+        record["delay"] = _short(np.asarray(record["delay"], dtype=float) + by)
     return study
+
+
+def _short(seconds: Array) -> float | list[float]:
+    """Write delays, s, without the last digits of a sum: one number if all joints have the same."""
+    values = [float(x) for x in np.atleast_1d(np.round(seconds, 12) + 0.0)]
+    return values[0] if len({*values}) == 1 else values
 
 
 def differences(before: Any, after: Any, path: tuple[str | int, ...] = ()) -> Iterator[Lines]:

@@ -2,9 +2,9 @@
 
     g(a, b) = |g| (e + a u + b v)/||e + a u + b v||,    e = g/|g|; u, v, e orthonormal
 
-Gauss-Newton steps of (a, b) beside the parameters of the robot (`Baseline.first_step`) start at the
-direction of the reading; the rows of the search are fitted again after each step. Directions far
-off are causes of their own: gravity along another axis.
+Gauss-Newton steps fit (a, b) together with the parameters of the robot (`Baseline.first_step`).
+They start at the direction of the reading, and the rows of the search are fitted again after each
+step. A direction along another axis is not found in this way: it is a cause of its own.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ LIMIT = limits(__package__)
 Array = np.ndarray
 
 
-def towards(g: Array, a: float, b: float) -> Array:
-    """Turn gravity g, shape (3,), by two small angles; its size stays."""
+def turned_gravity(g: Array, a: float, b: float) -> Array:
+    """Turn gravity g, shape (3,), by two small angles; its magnitude stays."""
     size = float(np.linalg.norm(g))
     e = g / size
     u = np.cross(e, np.eye(3)[int(np.argmin(np.abs(e)))])
@@ -48,14 +48,15 @@ def along(g: Array, n: int, before: Array) -> Cause:
         kind="gravity",
         says=f"gravity is turned by {angle:.1f} degrees: [{entry}] m/s^2 in frame 0",
         remedy=f"set gravity: [{entry}], or turn frame 0",
+        subject="the direction of gravity",
         constants=dict(zip(GRAVITY, map(float, g), strict=True)),
     )
 
 
 def tilted(reading: Reading) -> Cause | None:
-    """Search the direction of gravity that explains the rows of the search best.
+    """Search for the direction of gravity that explains the rows of the search best.
 
-    None if it is that of the reading, or if the rows do not show it.
+    Return None if the best direction is that of the reading, or if the rows do not determine it.
     """
     first, n = gravity_of(reading), len(reading.p)
     if reading.baseline is None or not first.any() or reading.data.case.variants is None:
@@ -72,7 +73,7 @@ def tilted(reading: Reading) -> Cause | None:
         a, b = np.clip(step[0], -0.5, 0.5)
         better = None
         for share in (1.0, 0.3):
-            new = towards(g, share * a, share * b)
+            new = turned_gravity(g, share * a, share * b)
             other = reading.changed(along(new, n, first))
             if (
                 other is not None
@@ -94,13 +95,14 @@ def tilted(reading: Reading) -> Cause | None:
 
 
 def _start(reading: Reading, first: Array) -> tuple[Array, Reading]:
-    """Return the best of five directions: that of the reading, and four that are turned from it.
+    """Return the best of five directions: the direction of the reading, and four directions turned
+    from it.
 
     A turn about an axis in the plane of all motion has no effect of first order.
     """
     best = first, reading
     for a, b in ((0.4, 0.0), (-0.4, 0.0), (0.0, 0.4), (0.0, -0.4)):
-        g = towards(first, a, b)
+        g = turned_gravity(first, a, b)
         other = reading.changed(along(g, len(reading.p), first))
         if other is None or other.baseline is None or best[1].baseline is None:
             continue
@@ -110,6 +112,6 @@ def _start(reading: Reading, first: Array) -> tuple[Array, Reading]:
 
 
 def _turned(g: Array, n: int, k: int, xi: float) -> Cause:
-    """Make the cause of a turn by the angle xi about one of two axes."""
-    g = towards(g, *(xi, 0.0) if k == 0 else (0.0, xi))
+    """Make the cause (possible error) that gravity is turned by the angle xi about one of two axes."""
+    g = turned_gravity(g, *(xi, 0.0) if k == 0 else (0.0, xi))
     return unchanged_study(n, constants=dict(zip(GRAVITY, map(float, g), strict=True)))

@@ -1,9 +1,10 @@
-"""Delays of the torques against the positions, on the rows of the search alone.
+"""Delays of the torques relative to the positions, found from the rows of the search alone.
 
     tau_j(t + delay_j) = [W chi]_j + rho
 
-W stays, and the torques are read at other instants. First one delay of all joints is searched, then
-one of each joint from there. The score is that of least squares with weights by joint.
+W stays the same, and the torques are read at other instants. First, one delay of all joints is
+searched; from this value, a delay of each joint. The score is that of least squares with weights by
+joint.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ Array = np.ndarray
 
 
 def late_torques(reading: Reading) -> tuple[Array, str] | None:
-    """Search the delays of the torques, s, shape (n,); None if no joint is late beyond doubt.
+    """Search for the delays of the torques, s, shape (n,); None if no joint is late beyond doubt.
 
-    Return them with a sentence.
+    Return the delays with a sentence.
     """
     baseline, n = reading.baseline, len(reading.p)
     if baseline is None:

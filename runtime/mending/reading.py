@@ -1,11 +1,12 @@
-"""One reading of the records: what they mean if a set of errors of the study is corrected.
+"""A reading of the records: positions and torques as they are if a set of errors of the study is
+corrected.
 
     q'(t) = P q(t f) + p,   tau'_j(t) = [T tau]_j((t + delay_j) f),   t f: instants of the record
 
-f is the factor on the sampling rate. Filters are linear, so that a reading needs the filtered
-samples of the records once; its robot is a table of constants of the module of `symgen.variants`.
-Each change is written into the study at once (`runtime.mending.edits`), so that a reading which no
-study can express does not exist.
+f is the factor on the sampling rate. Filters are linear, so that all readings use the same filtered
+samples of the records; the robot of a reading is a table of constants for the module of
+`symgen.variants`. Each change is written into the study at once (`runtime.mending.edits`), so that
+every reading is one that a study can express.
 """
 
 from __future__ import annotations
@@ -66,19 +67,27 @@ class Step:
     Attributes
     ----------
     says : str
-        Sentence on what was wrong.
+        Sentence on the error.
     cause : Cause or None
     delay : ndarray, shape (n,), s, or None
+    named : bool
+        Whether the change was decisive where it was made.
     """
 
     says: str
     cause: Cause | None = None
     delay: Array | None = None
+    named: bool = False
 
     @property
     def kind(self) -> str:
         """Family of the cause, or delay."""
         return "delay" if self.cause is None else self.cause.kind
+
+    @property
+    def subject(self) -> str:
+        """What it changes: the same for all amounts of one number."""
+        return "delay" if self.cause is None else self.cause.subject or self.cause.says
 
     @property
     def numbers(self) -> int:
@@ -96,12 +105,12 @@ class Data:
     ----------
     case : Case
     samples : Samples
-        Of all records, filtered, at K instants.
+        Filtered samples of all records, at K instants.
     seen, aside : ndarray of bool, shape (K,)
-        Instants of the search, and those set aside before it. Instants near a border of both
-        are in neither.
+        Instants of the search, and instants set aside before the search. Instants near a border
+        between the two belong to neither.
     unseen : Samples or None
-        Of the validation records.
+        Samples of the validation records.
     place : Place
     """
 
@@ -131,7 +140,7 @@ def set_aside(samples: Samples, margin: float) -> tuple[Array, Array]:
 
     margin : time on both sides of a border that belongs to no block, s.
 
-    Return which instants are of the search, and which are set aside, bool (K,) each.
+    Return two masks, bool (K,): the instants of the search, and the instants set aside.
     """
     seen, aside = np.zeros(len(samples), dtype=bool), np.zeros(len(samples), dtype=bool)
     for number in np.unique(samples.record):
@@ -173,8 +182,6 @@ class Reading:
     drives : Drives or None
     steps : tuple of Step
         The changes, in their order.
-    named : bool
-        Whether every change was a named cause: decisive where it was made.
     """
 
     data: Data
@@ -189,7 +196,6 @@ class Reading:
     units: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     drives: Drives | None = None
     steps: tuple[Step, ...] = ()
-    named: bool = True
 
     @classmethod
     def given(cls, data: Data, study: Lines) -> Reading:
@@ -211,10 +217,20 @@ class Reading:
         """Text that is the same for readings with the same lines of the study."""
         return dumps(plain(self.study), sort_keys=True)
 
+    @property
+    def subjects(self) -> frozenset[str]:
+        """What the changes change, whatever their amounts."""
+        return frozenset(step.subject for step in self.steps)
+
+    @property
+    def named(self) -> bool:
+        """Whether every change was a named cause: decisive where it was made."""
+        return all(step.named for step in self.steps)
+
     # --- changes ---
 
     def changed(self, cause: Cause, *, named: bool = False) -> Reading | None:
-        """Correct one more error; None if no study can express this."""
+        """Correct one more error; return None if no study can express the correction."""
         if cause.kind in NOT_WRITTEN:
             return None
         if cause.kind == "zero":
@@ -263,8 +279,7 @@ class Reading:
             sides=sides,
             units=units,
             drives=drives,
-            steps=(*self.steps, Step(cause.says, cause)),
-            named=self.named and named,
+            steps=(*self.steps, Step(cause.says, cause, named=named)),
         )
 
     def late(self, delay: Array, says: str, *, named: bool = False) -> Reading:
@@ -272,27 +287,26 @@ class Reading:
         own = np.round(delay, 4)
         return replace(
             self,
-            study=delayed(self.study, own),
+            study=delayed(self.study, own - self.delay),
             delay=own,
-            steps=(*self.steps, Step(says, delay=own)),
-            named=self.named and named,
+            steps=(*self.steps, Step(says, delay=own, named=named)),
         )
 
     def short(self, delay: Array) -> bool:
-        """Whether delays, s, are below a twentieth of every record, as this reading times it."""
+        """Whether delays, s, are below a twentieth of every record, by the clock of this reading."""
         lasts = min(float(one.record.t[-1] - one.record.t[0]) for one in self.data.case.through)
         return bool(np.abs(delay).max() < 0.05 * lasts / self.rate)
 
     def again(self, steps: Sequence[Step]) -> Reading | None:
-        """Make the changes `steps` in this reading; None if one of them cannot be written."""
+        """Make the changes `steps` in this reading; return None if one of them cannot be written."""
         reading: Reading | None = self
         for step in steps:
             if reading is None:
                 return None
             if step.delay is not None:
-                reading = reading.late(step.delay, step.says)
+                reading = reading.late(step.delay, step.says, named=step.named)
             elif step.cause is not None:
-                reading = reading.changed(step.cause)
+                reading = reading.changed(step.cause, named=step.named)
         return reading
 
     def _zeros(self, cause: Cause) -> Cause | None:
@@ -313,7 +327,7 @@ class Reading:
         return {} if variants is None else variants.CONSTANTS
 
     def _rounded(self, cause: Cause) -> Cause:
-        """Round the numbers of a cause to those that are written."""
+        """Round the numbers of a cause to the digits that are written."""
         if cause.constants:
             return replace(
                 cause,
@@ -332,7 +346,8 @@ class Reading:
         return replace(cause, **robot.positions(E["P"]), **robot.torques(E["T"]))
 
     def _of_columns(self, cause: Cause) -> Cause:
-        """Apply a change of motor positions before the offset of the drives, as a file has it.
+        """Apply a change of motor positions before the offset of the drives is subtracted, as in a
+        file.
 
         q' = P (q - offset) + offset
         """
@@ -346,21 +361,27 @@ class Reading:
 
     @property
     def robot(self) -> Robot:
-        """Joints and drives of this reading, to write changes of the files as those of joints."""
+        """Joints and drives of this reading, to convert changes of the files to changes at the
+        joints.
+        """
         robot = Robot(self.data.case.model, None, self.sides)
         if self.drives is not None:
             robot.R, robot.offset = self.drives.ratio, self.drives.offset
         return robot
 
     def _reordered(self, T: Array) -> Array | None:
-        """Delays of the joints after a change T of the torques; None if it mixes late torques."""
+        """Delays of the joints after a change T of the torques; None if T mixes torques that are
+        late.
+        """
         if len({*self.delay}) == 1:
             return self.delay
         found = monomial(T)
         return None if found is None else self.delay[found[0]]
 
     def of_robot(self, path: tuple[str | int, ...]) -> Any:
-        """Return an entry of the robot file as this reading has it; None if it has none."""
+        """Return an entry of the robot file with the value in this reading; None if there is no
+        such entry.
+        """
         free = {**self._free, **self.constants}
         if path == ("gravity",):
             return [free.get(key, 0.0) for key in GRAVITY]
@@ -396,7 +417,9 @@ class Reading:
 
     @cached_property
     def model(self) -> Any:
-        """The robot of this reading; its columns are the standard parameters, with `variants`."""
+        """The model of this reading; if `variants` is given, its columns are the standard
+        parameters.
+        """
         case = self.data.case
         return case.model if case.variants is None else Bound(case.variants, self.constants)
 
@@ -405,7 +428,7 @@ class Reading:
         return regressor(self.model, (samples.q, samples.qd, samples.qdd))
 
     def fitted(self, *, values: bool = True) -> Baseline | None:
-        """Fit the rows of the search; None if they cannot be evaluated.
+        """Fit the rows of the search; None if the model cannot be evaluated there.
 
         values : whether the fit stays near the values of the robot file.
         """
@@ -425,12 +448,12 @@ class Reading:
 
     @cached_property
     def baseline(self) -> Baseline | None:
-        """Fit of the rows of the search by a physical robot near the values of its file."""
+        """Fit of the rows of the search by a physical robot near the values of the robot file."""
         return self.fitted()
 
     @cached_property
     def alone(self) -> Baseline | None:
-        """The same without the values of the robot file."""
+        """Fit of the rows of the search by a physical robot, without the values of the robot file."""
         if self.data.case.robot_values is None:
             return self.baseline
         return self.fitted(values=False)
@@ -441,7 +464,7 @@ class Reading:
         return np.inf if self.baseline is None else over_joints(self.baseline.given.errors)
 
     def score(self, N: float) -> float:
-        """Minus the log-likelihood of the rows of the search, nats, with a price of each change.
+        """Minus the log-likelihood of the rows of the search, nats, plus a penalty for each change.
 
         N : number of independent rows of a joint. Errors are relative to the torques of the
         reading, so that readings with other torques can be compared.
@@ -472,8 +495,8 @@ class Reading:
     def unseen(self) -> tuple[float, float]:
         """Errors of the rows that are set aside, %, by the fit of the rows of the search.
 
-        The root mean square over the joints, and the share of all torques, each the larger one
-        of the records and the validation records.
+        The result is the root mean square over the joints, and the share of all torques; each is
+        the larger value of the records and the validation records.
         """
         if self.baseline is None:
             return np.inf, np.inf

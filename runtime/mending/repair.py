@@ -1,11 +1,14 @@
-"""Repair of a study: which lines of it are wrong, judged on rows that found none of them.
+"""Repair of a study: find its wrong lines, and judge the corrections on rows that the search did
+not use.
 
     blocks of the records set aside -> search on the others -> judge on those set aside -> lines
 
 Errors are root mean squares over the joints. A repair is kept if it leaves less than REMAINS of all
-torques of the unseen rows, and less than SHARE of the error of the study as given, or if every change is a named cause (`runtime.plausible`) and it leaves less
-than REMAINS_NAMED; unless it is a unit or a side, the error must fall, since a number that only the
-values of the robot file speak for is a guess. It is kept as a whole or not at all: half of a repair is another error.
+torques of the unseen rows, and less than SHARE of the error of the study as given. It is also kept
+if every change is a named cause (`runtime.plausible`) and the repair leaves less than
+REMAINS_NAMED. Unless the change is a unit or a side, the error must fall, since a number that only
+the values of the robot file support is a guess. A repair is kept as a whole or not at all: half of
+a repair is another error.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.model import axes_of, drives_of
+from runtime.core.model import drives_of, require_no_axes
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.ground.check import Check
@@ -29,7 +32,7 @@ from runtime.ground.progress import at
 from runtime.ground.settings import structure, to_mapping
 from runtime.mending.edits import Columns, Lines, Place, columns_in, differences
 from runtime.mending.reading import Data, Reading, record_of, set_aside
-from runtime.mending.search import Found, further, search
+from runtime.mending.search import BY_VALUES, Search
 from runtime.plausible.case import Case
 from runtime.plausible.friction import friction
 from runtime.plausible.jumps import cut_torques, jumps
@@ -40,8 +43,6 @@ from runtime.reading.publishers import Sent, of_one_publisher
 LIMIT = limits(__package__)
 
 Array = np.ndarray
-BY_VALUES = ("unit", "side")
-"""Kinds of causes that the values of the robot file alone may show: they fit no number."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,11 @@ class Change(Result):
     path : tuple of str and int
         Keys that lead to the line: ("record", 0, "scale", "tau").
     before, after : value
-        What was there, and what replaces it.
+        The value in the given study, and its replacement.
     says : str
-        What was wrong.
+        Sentence on the error.
     error_without, error_with : float, %
-        Error of the unseen rows with all other changes, and with this one too.
+        Error of the unseen rows with all other changes, and with this change too.
     """
 
     path: tuple[str | int, ...]
@@ -80,7 +81,9 @@ class Change(Result):
 
     @property
     def comment(self) -> str:
-        """Comment on the line: what was there, why it changes, and what it explains."""
+        """Comment on the line: the value before, the reason for the change, and the error that it
+        explains.
+        """
         return (
             f"was {self.was}: {self.says}; rows that were not used: "
             f"{self.error_without:.2g} % without this line, {self.error_with:.2g} % with it"
@@ -89,7 +92,8 @@ class Change(Result):
 
 @dataclass(frozen=True)
 class Candidate(Result):
-    """A set of changes that was not written: its lines, what it says, and what it leaves.
+    """A set of changes that was not written: its lines, sentences on the errors, and the error that
+    is left.
 
     Attributes
     ----------
@@ -115,23 +119,24 @@ class Repair(
     kept : bool
         Whether the study changes.
     reason : str
-        Why it does, or does not.
+        Reason why the study changes, or why it does not.
     changes : tuple of Change
         Empty if nothing is kept.
     before, after : float, %
         Error of the unseen rows with the study as given, and with the best changes found.
     study : Study
-        With all changes; the given one if nothing is kept.
+        The study with all changes; the given study if no change is kept.
     records : tuple of Record
-        Read by this study.
+        Records as this study reads them.
     equivalent : tuple of Candidate
-        Other lines that this record cannot tell from those written.
+        Other lines that this record cannot distinguish from the written lines.
     hidden : tuple of str
-        What no fit of this record can show, with or without a repair.
+        Errors that no fit of this record can show, with or without a repair.
     candidates : tuple of Candidate
-        If nothing is kept: what explains most first.
+        Sets of changes that were not certain enough, the one that explains most first; empty if the
+        study changes.
     readings : int
-        Readings for which all causes were tried.
+        Number of readings for which all causes were tried.
     """
 
     kept: bool
@@ -148,7 +153,9 @@ class Repair(
 
     @property
     def apart(self) -> str:
-        """What would tell the equivalent readings apart; "" without such readings."""
+        """Sentence on a test that would distinguish the equivalent readings; "" without such
+        readings.
+        """
         if not self.equivalent:
             return ""
         return (
@@ -194,25 +201,25 @@ def repair(
     variants: Any,
     folder: str | Path | None = None,
 ) -> Repair:
-    """Search the lines of a study that are wrong, and write the study in which they are right.
+    """Search for the lines of a study that are wrong, and write the study in which they are right.
 
     Parameters
     ----------
     problem : Problem
         Prepared.
     study : Study
-        As it was given, with at least one entry in `record`.
+        The given study, with at least one entry in `record`.
     records : sequence of Record
-        As they were read, before any preparation step.
+        Records as they were read, before any preparation step.
     variants : GeneratedModel or None
         The module of `symgen.variants`; without it, no entry of the robot file is corrected.
     folder : str, Path or None
-        That of the files of the study.
+        Folder of the files of the study.
 
     Raises
     ------
     InputError
-        Records that are broken (gaps, jumps, cut torques, two publishers), or that do not suit.
+        The records are broken (gaps, jumps, cut torques, two publishers), or do not suit the study.
     """
     case = _case(problem, variants)
     lines = to_mapping(study)
@@ -220,13 +227,14 @@ def repair(
     data = data_of(case, problem, lines, columns, records[0].rate)
     start = Reading.given(data, lines)
     if start.baseline is None:
-        raise InputError("the rows of the study cannot be fitted; identify says why")
+        raise InputError(
+            "the rows of the study cannot be fitted; `symgen identify` gives the reason"
+        )
     began = process_time()
-    found = search(start, lambda: process_time() - began)
-    best = _without_needless(found.best, start, found.N)
-    if best.key not in found.hidden:
-        found.hidden[best.key] = further(best)[1]
-    same = found.hidden[best.key]
+    found = Search(start, lambda: process_time() - began)
+    found.from_start()
+    best = found.settled(found.best)
+    same = found.hidden(best)
     best, others = _simplest(best, start, found)
     at("repair: the rows that were set aside")
     kept, reason = _judged(best, start)
@@ -244,7 +252,7 @@ def repair(
             tuple(records),
             hidden=hidden,
             candidates=tuple(_candidate(one, start) for one in listed),
-            readings=found.expanded,
+            readings=len(found.tried),
         )
     return Repair(
         True,
@@ -256,15 +264,14 @@ def repair(
         tuple(record_of(best, one) for one in records),
         equivalent=tuple(_candidate(one, start) for one in others),
         hidden=hidden,
-        readings=found.expanded,
+        readings=len(found.tried),
     )
 
 
 def _case(problem: Problem, variants: Any) -> Case:
-    """Prepare the data of a repair; InputError for records that are broken or do not suit."""
+    """Prepare the data of a repair; raise InputError for records that are broken or do not suit."""
     problem.require_motion("a repair")
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(f"a study with {axes[0]} is not repaired; repair it {axes[1]}")
+    require_no_axes(problem.model, "the repair of a study")
     for record in (*problem.records, *problem.unseen):
         if record.origin.whole:
             raise InputError(
@@ -319,26 +326,8 @@ def data_of(case: Case, problem: Problem, study: Lines, columns: Columns, rate: 
     return Data(case, samples, seen, aside, unseen, place)
 
 
-def _without_needless(best: Reading, start: Reading, N: float) -> Reading:
-    """Leave out each change without which the rows of the search are explained nearly as well.
-
-    A change must gain what names a cause (DECISIVE), and more than nearness to the values of the
-    robot file, unless it is a unit or a side.
-    """
-    least = LIMIT.DECISIVE - LIMIT.CHANGE_PRICE
-    for step in best.steps:
-        others = [one for one in best.steps if one is not step]
-        fewer = start.again(others)
-        if fewer is None:
-            continue
-        by_values = fewer.error < LIMIT.LEAST_FALL * best.error and step.kind not in BY_VALUES
-        if by_values or fewer.score(N) <= best.score(N) + least:
-            return _without_needless(replace(fewer, named=best.named), start, N)
-    return best
-
-
 def _weight(reading: Reading, start: Reading) -> tuple[int, int]:
-    """Count the values that differ from the study as given, and those of the robot among them."""
+    """Count the values that differ from the given study, and how many of these describe the robot."""
     count = of_robot = 0
     for line in differences(start.study, reading.study):
         path, before, after = line["path"], line["before"], line["after"]
@@ -353,23 +342,25 @@ def _weight(reading: Reading, start: Reading) -> tuple[int, int]:
     return count, of_robot
 
 
-def _simplest(best: Reading, start: Reading, found: Found) -> tuple[Reading, list[Reading]]:
-    """Of the readings that this record cannot tell from the best, choose the simplest.
+def _simplest(best: Reading, start: Reading, found: Search) -> tuple[Reading, list[Reading]]:
+    """Choose the simplest of the readings that this record cannot distinguish from the best.
 
-    Return it, and the others that are as simple as the best one.
+    Return this reading, and the others that are as simple as the best.
     """
     if not best.steps:
         return best, []
     weight = _weight(best, start)
     N = found.N
     level = best.score(N) - best.price(N)
-    alike = {best.key: best}
-    for cause in found.hidden[best.key]:
-        one = best.changed(cause)
-        if one is not None:
-            alike[one.key] = replace(one, named=best.named)
-    for one in found.readings.values():
-        if one.steps and one.score(N) - one.price(N) < level + LIMIT.SAME:
+    hidden = [best.changed(cause, named=True) for cause in found.hidden(best)]
+    others = [
+        one
+        for one in sorted(found.readings.values(), key=lambda one: one.score(N))
+        if one.steps and one.score(N) - one.price(N) < level + LIMIT.SAME
+    ]
+    alike: dict[str, Reading] = {}
+    for one in (best, *hidden, *others):  # other amounts of the same numbers are no other reading
+        if one is not None and all(one.subjects != x.subjects for x in alike.values()):
             alike.setdefault(one.key, one)
     simple = [one for one in alike.values() if _weight(one, start)[0] <= weight[0] and one.steps]
     chosen = min(simple, key=lambda one: (_weight(one, start), one is not best))
@@ -405,7 +396,7 @@ def _judged(best: Reading, start: Reading) -> tuple[bool, str]:
 def lines_of(start: Reading, end: Reading) -> list[Lines]:
     """List the lines that differ between two readings: path, value before, value after.
 
-    What the study does not give of the robot is that of its file.
+    If the study does not give an entry of the robot, the value is that of the robot file.
     """
     told = []
     for line in differences(start.study, end.study):
@@ -430,7 +421,7 @@ def _candidate(reading: Reading, start: Reading) -> Candidate:
 def _changes(best: Reading, start: Reading) -> list[Change]:
     """Write each changed line, with the steps that change it.
 
-    A line belongs to the steps without which it would be another one.
+    A line belongs to the steps without which it would have another value.
     """
     after = best.unseen_error
     told: dict[tuple[str | int, ...], list[tuple[str, float]]] = {}

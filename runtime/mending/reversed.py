@@ -1,9 +1,10 @@
 """Patterns of reversed torques, all at once.
 
-W stays and torques only change their signs, so that 2^n fits cost little. Friction is not negative
-in them, and bodies exist: a fit of free parameters hides a sign as negative friction. Only the sum
-over the joints of mean(tau qd) over a closed motion is dissipation; no sign of a single joint
-follows from it, so that all patterns are fitted.
+W stays the same and torques only change their signs, so that 2^n fits cost little. The fits allow
+neither negative friction nor impossible bodies, because a fit of free parameters hides a wrong sign
+as negative friction. Over a closed motion, only the sum of mean(tau qd) over all joints is
+dissipation; the sign of a single joint does not follow from this sum, so that all patterns are
+fitted.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ Array = np.ndarray
 
 
 def patterns(n: int) -> Iterator[tuple[int, ...]]:
-    """Yield sets of joints whose torques may be reversed: all, or one and two of many joints."""
+    """Yield sets of joints whose torques may be reversed: all sets, or sets of one and two joints
+    if the robot has many.
+    """
     most = n if n <= LIMIT.PATTERNS_OF else 2
     for count in range(1, most + 1):
         yield from combinations(range(n), count)

@@ -1,12 +1,12 @@
 """Samples of a position that repeat the one before, although the joint moves.
 
-A controller or a logger without a new packet repeats the last one, and the next change makes up
-for it: after g rows it is
+A controller or a logger without a new packet repeats the last packet, and the next change makes up
+for the pause: after g rows the change is
 
-    s = g v (1 +- LIMIT.CATCHES_UP)          v = mean speed before and after, per row; both are alike
+    s = g v (1 +- CATCHES_UP)          v = mean speed before and after, per row; both are similar
 
-A joint at rest, one that starts, or between two steps of a coarse encoder, shows no such change; chance repeats a
-noisy value less often the larger the speed.
+A joint at rest, a joint that starts, and a joint between two steps of a coarse encoder show no such
+change. By chance, a noisy value repeats less often the higher the speed is.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Array = np.ndarray
 def held_positions(q: Array) -> Array:
     """Find the positions that repeat the sample before although the joint moves, bool (N, n).
 
-    Where all positions repeat, the evidence of the joints is added, and all are marked.
+    If all positions of a row repeat, the evidence of the joints is added, and all are marked.
 
     q : positions, shape (N, n).
     """
@@ -46,9 +46,9 @@ def repeated_mostly(x: Array) -> bool:
 
 
 def _evidence(x: Array) -> Array:
-    """Compute the evidence that samples of one position are held, shape (N,); 0 of other samples.
+    """Compute the evidence that samples of one position are held, shape (N,); 0 for other samples.
 
-    It is the square of v (g - 1) over twice the largest noise nearby: the exponent of the
+    The evidence is the square of v (g - 1) over twice the largest noise nearby: the exponent of the
     probability that noise repeats a value.
     """
     evidence = np.zeros(len(x))

@@ -12,7 +12,7 @@ in between repeat positions, torques, or both:
                       for a reader that accepts missing positions
 
 A record is refused if its signals come in packets of different times, or if most positions repeat
-and the new ones come at no uniform times.
+and new positions come at no uniform times.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Bus:
     ticks : Ticks
         Rows with a new packet.
     q, tau : bool
-        Whether positions and torques change only with packets, of this bus or of a faster one.
+        Whether positions and torques change only with packets of this bus or of a faster bus.
     """
 
     ticks: Ticks
@@ -67,7 +67,7 @@ class Bus:
 
 @dataclass(frozen=True, eq=False)
 class Told(Part):
-    """Part that tells which rows are left out or replaced because they are no measurements.
+    """Part on the rows that are left out or replaced because they are no measurements.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Told(Part):
 
 
 def packets_told(result: Identification) -> Told | None:
-    """Return the part on rows that are no measurements; None if every row is one."""
+    """Return the part on rows that are no measurements; None if every row is a measurement."""
     note = result.problem.noted(KIND)
     return None if note is None else Told(note.result)
 
@@ -115,7 +115,9 @@ def packets_once(problem: Problem) -> Problem:
 
 
 def _measured(problem: Problem, record: Record, told: list[str]) -> Record:
-    """Return a record without rows that repeat earlier ones; add sentences on them to `told`."""
+    """Return a record without rows that repeat earlier rows; add sentences on the repeated rows to
+    `told`.
+    """
     bus = slowest_bus(record)
     if bus is not None and (bus.q or _sampled(problem, record, bus.ticks)):
         period, kept = bus.ticks.period, len(bus.ticks.rows)
@@ -138,7 +140,8 @@ def _measured(problem: Problem, record: Record, told: list[str]) -> Record:
 def slowest_bus(record: Record) -> Bus | None:
     """Find the slowest bus of a record; None if positions and torques are measured in each row.
 
-    InputError if a signal that changes with packets has none at the times of the slowest bus.
+    Raise InputError if a signal that changes with packets has no packet at the times of the slowest
+    bus.
     """
     signals = [*record.q.T, *([] if record.origin.by_law else record.tau.T)]
     found = [ticks_of(changed(x[:, None]), len(x)) if many_steps(x) else None for x in signals]
@@ -206,7 +209,7 @@ def _alone(problem: Problem, record: Record) -> Problem:
 
 
 def _without_held(problem: Problem, record: Record, told: list[str]) -> Record:
-    """Replace single samples that repeat the one before; add a sentence on them to `told`."""
+    """Replace single samples that repeat the sample before; add a sentence on them to `told`."""
     held = held_positions(record.q)
     held[_long(np.asarray(held.any(axis=1)), LIMIT.BRIDGED * record.rate)] = False
     rows = held.any(axis=1)

@@ -31,7 +31,7 @@ class Ticks:
     Attributes
     ----------
     period : float, rows
-        Of the bus.
+        Period of the bus.
     rows : ndarray of int, shape (K,)
         The row of each packet, one for each period of the bus from the first to the last.
     start : float, rows
@@ -55,7 +55,7 @@ def changed(x: Array) -> Array:
 
 
 def ticks_of(c: Array, N: int) -> Ticks | None:
-    """Find the bus whose packets changed the rows c of N rows; None if there is none for certain."""
+    """Find the bus whose packets changed the rows c of N rows; None if no bus is certain."""
     gaps = np.diff(c)
     if len(c) < 2 * BEGINNING:
         return None

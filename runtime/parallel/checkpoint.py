@@ -107,7 +107,8 @@ class Checkpoint:
         self.file.with_name(FILE + UNFINISHED).unlink(missing_ok=True)
 
     def _read(self, b: int) -> Runs:
-        """Read the runs from the file; InputError if it is damaged or belongs to another study.
+        """Read the runs from the file; raise InputError if it is damaged or belongs to another
+        study.
 
         Pickled objects are refused.
         """

@@ -39,7 +39,7 @@ STEP = 1e-30  # of complex derivatives
 class Place:
     """A place on the link of a load, with its pose T, shape (4, 4), in the frame of the link.
 
-    `name` is that of the robot file, and `words` says which place it is.
+    `name` is the name in the robot file, and `words` says in words which place it is.
     """
 
     name: str
@@ -56,7 +56,8 @@ class Body:
     place : Place
         The place whose frame is used.
     value, sigma : ndarray, shape (10,)
-        The NUMBERS, and their standard deviations; nan for numbers that no torque determines.
+        Mass, centre of mass (x, y, z) and inertia tensor (xx, yy, zz, xy, xz, yz), and their
+        standard deviations; nan for a number that no torque determines.
     """
 
     place: Place
@@ -98,15 +99,16 @@ class Body:
 def place_on(
     mounts: Mapping[str, tuple[int, Any]], link: int, frame: int, at: str | None, T: Array
 ) -> Place:
-    """Choose the place for a load on `link`: `at`, or tool0, flange or the last one on the link.
+    """Choose the place for a load on `link`: `at` or, without `at`, tool0, flange or the last named
+    place on the link.
 
     Parameters
     ----------
     mounts : mapping
         Link and pose of each named place of the robot.
     frame : int
-        Number of the frame of the estimated parameters, which is the place if it is not that of the
-        link, or if the link has no named place.
+        Number of the frame of the estimated parameters, which is the place if it is not the frame
+        of the link, or if the link has no named place.
     at : str or None
         Name that the user gave.
     T : ndarray, shape (4, 4)
@@ -121,7 +123,7 @@ def place_on(
     if at is not None and at not in names:
         listed = ", ".join(names[:20]) or "none"
         raise SettingsError(
-            f"{at!r} is no link of the robot file on link {link}; those are {listed}",
+            f"{at!r} is no named place on link {link}; the robot file has the places {listed}",
             path=("payload", "at"),
         )
     if at is None and (frame != link or not names):
@@ -145,7 +147,7 @@ def body_at(
     T : ndarray, shape (4, 4)
         Pose, in the frame of the link, of the frame of chi.
     chi : ndarray, shape (10,)
-        Parameters of the load, in the order of INERTIAL.
+        Parameters of the load, in the order XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
     covariance : ndarray, shape (10, 10)
         Covariance of chi; zero for given parameters.
     unknown : sequence of bool, shape (10,)
@@ -169,7 +171,8 @@ def body_at(
 
 
 def _body(pose: Array, chi: Array) -> Array:
-    """Compute mass, centre and tensor about it, shape (10,), in the frame in which `pose` is given.
+    """Compute mass, centre and the inertia tensor about the centre, shape (10,), in the frame in
+    which `pose` is given.
 
     chi may be complex.
     """

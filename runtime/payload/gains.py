@@ -1,8 +1,8 @@
 """Torque constants of the drives, estimated from a load of known mass.
 
-The torque of a record is v, computed with the torque constants of the robot file; the true one is g
-v, a factor per motor. V holds the share of every motor in the torque of every joint (block diagonal
-without coupling), a without the load, b with it:
+Let v be the torque of a record, computed with the torque constants of the robot file; the true
+torque is g v, with a factor g for each motor. V holds the share of every motor in the torque of
+every joint (block diagonal without coupling); the index a means without the load, b with the load:
 
     [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
 
@@ -15,8 +15,9 @@ without coupling), a without the load, b with it:
 
 The reported load is computed from the torques times g; its standard deviations include those of g.
 
-The gain of a motor whose torque does not change with the load is not determined: its large standard
-deviation shows this, and it is refused. Without a weighed load no record separates g from X.
+If the torque of a motor does not change with the load, its gain is not determined: the standard
+deviation is then large, and the gain is refused. Without a weighed load no record separates g from
+X.
 
 Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
 identification.md 5.8.
@@ -92,8 +93,8 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
     def refused(self) -> tuple[str, ...]:
         """Motors whose factor g is not determined, since the standard deviation of g is too large.
 
-        The %sigma of g is LIMIT.GAIN_REFUSED or more. The factor is that of the joint solution
-        `together`.
+        The %sigma of g is too large (GAIN_REFUSED in limits.toml or more). The factor is that of
+        the joint solution `together`.
         """
         return tuple(
             j

@@ -2,19 +2,19 @@
 
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
-a without, b with the load; K_L the ten columns of K = dX/dchi of the link to which the load is
-fixed. chi_L are then XX ... M of the load alone at the frame of that link, or with K_L A
-at a frame fixed to the link. Known parameters (a weighed M) move to the
-left. A parameter of the load is reported only if it has an effect; its standard deviation shows
-whether the motion excites it. If friction changes with the load, rows b have friction columns of
-their own.
+The index a means without the load, b with the load. K_L has the ten columns of K = dX/dchi of the
+link to which the load is fixed. chi_L are then XX ... M of the load alone at the frame of that link,
+or with K_L A at a frame fixed to the link. Known parameters (a weighed M) move to the left. A
+parameter of the load is reported only if it has an effect; its standard deviation shows whether the
+motion excites it. If friction changes with the load, rows b have friction columns of their own.
 
 Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of
 industrial manipulators.
 
-A tool or load of known inertia changes the base parameters of a robot. Its ten parameters are those in the frame at which it is mounted; they are transformed
-to the frame of the link. With P the pseudo-inertia of a body (`runtime.physical.inertia`), about
-and along the axes of frame f, and lTf the pose of f in the frame of its link l,
+A tool or load of known inertia changes the base parameters of a robot. Its ten parameters are given in
+the frame at which it is mounted, and are transformed to the frame of the link. With P the
+pseudo-inertia of a body (`runtime.physical.inertia`), about and along the axes of frame f, and lTf
+the pose of f in the frame of its link l,
 
     P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
     X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
@@ -185,7 +185,7 @@ def payload(
     )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Add the columns of the load to W; they are zero if the load is not mounted.
+        """Add the columns of the load to W, which are zero if the load is not mounted.
 
         The torque of its known parameters is moved to Y.
         """
@@ -249,7 +249,7 @@ def load_columns(
 ) -> LoadColumns:
     """Compute the derivatives of the base parameters with respect to the parameters of a load.
 
-    SettingsError if there is no such link or frame.
+    Raise SettingsError if there is no such link or frame.
     """
     try:
         place = mount(model, settings.frame, settings.link)
@@ -279,7 +279,7 @@ class Mount:
     link : int
         Link to which the load is fixed.
     frame : int
-        Frame of its parameters: that of the link, or one fixed to the link.
+        Frame of its parameters: the frame of the link, or a frame fixed to the link.
     T : ndarray, shape (4, 4)
         Pose of the frame in the frame of the link.
     """
@@ -292,7 +292,7 @@ class Mount:
     def action(self) -> Array:
         """Matrix A, (10, 10), that transforms inertial parameters from `frame` to the link frame.
 
-        Their order is that of INERTIAL.
+        The order of the parameters is XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
         """
         return np.column_stack(
             [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
@@ -385,7 +385,8 @@ def load_effect(
     ----------
     model : GeneratedModel
     load : mapping
-        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; those left out are zero.
+        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; parameters that are left out are
+        zero.
     frame : int, optional
         Default: that of the link.
     link : int, optional
@@ -400,7 +401,9 @@ def load_effect(
 
 
 def load_vector(load: Mapping[str, float]) -> Array:
-    """Return the ten parameters of a load in the order of INERTIAL; InputError for another name."""
+    """Return the ten parameters of a load in the order XX ... M; raise InputError for any other
+    name.
+    """
     if unknown := [name for name in load if name not in INERTIAL]:
         raise InputError(
             f"unknown parameter {', '.join(unknown)} of a load; expected some of "
@@ -414,7 +417,8 @@ def load_of_body(
 ) -> dict[str, float]:
     """Compute the ten inertial parameters of a body from the numbers of its data sheet.
 
-    They are about the origin and along the axes of the frame on which the body is mounted.
+    The parameters are about the origin and along the axes of the frame on which the body is
+    mounted.
 
     Parameters
     ----------
@@ -444,7 +448,7 @@ def load_of_body(
 
 
 def ten_parameters(P: Array) -> Array:
-    """Compute the ten inertial parameters from a pseudo-inertia P, in the order of INERTIAL.
+    """Compute the ten inertial parameters from a pseudo-inertia P, in the order XX ... M.
 
     J = tr(S) 1 - S, with S its matrix of second moments.
     """

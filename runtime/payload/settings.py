@@ -24,16 +24,17 @@ class PayloadSettings(Settings):
     Attributes
     ----------
     link : int or None
-        Number of the link with the load; default: the last, or that of the frame.
+        Number of the link with the load; default: the link of `frame` or, without it, the last
+        link.
     frame : int or None
-        Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
-        load are meant; default: that of the link.
+        Frame fixed to that link, such as a tool frame (sigma 2), to which the parameters of the
+        load refer; default: the frame of the link.
     at : str or None
         Name of a link of the robot file, or a site of an MJCF, at which mass, centre and inertia of
-        the load are given; default: tool0, flange or the last one on that link.
+        the load are given; default: tool0, flange or the last named place on that link.
     known : mapping of float, SI
-        Parameters of the load, among XX XY XZ YY YZ ZZ MX MY MZ M at that frame, that were
-        weighed or computed.
+        Known parameters of the load (weighed or computed), among XX XY XZ YY YZ ZZ MX MY MZ M at
+        that frame.
     friction : bool
         Whether the records with the load have friction parameters of their own.
     gains : bool

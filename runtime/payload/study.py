@@ -1,6 +1,6 @@
 """Analysis of a load: its inertial parameters, and the torque constants of the drives.
 
-`runtime.payload.load`, `runtime.payload.gains`.
+The computations are in `runtime.payload.load` and `runtime.payload.gains`.
 """
 
 from __future__ import annotations
@@ -171,5 +171,7 @@ def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
 
 
 def _rows(model: GeneratedModel, record: Prepared, gains: DriveGains | None) -> Observation:
-    """Build the system Y = W X + rho of a record, with torque constants corrected if estimated."""
+    """Build the system Y = W X + rho of a record, with corrected torque constants, if these are
+    estimated.
+    """
     return record.observation(model) if gains is None else scaled(model, record, gains)

@@ -135,7 +135,7 @@ def consistency(result: Identification) -> Consistency:
     """Check whether a physical robot can have all parameters of an identification.
 
     Parameters that are not physical also pass if the record cannot distinguish them from physical
-    ones. InputError if the record does not determine all parameters.
+    ones. Raise InputError if the record does not determine all parameters.
     """
     if not result.determined:
         groups = "; ".join(", ".join(group) for group in result.estimate.groups)

@@ -97,15 +97,15 @@ class Feasibility:
     Attributes
     ----------
     margin : float
-        t*: a share of the link's second moment and mass in the robot file; SI if it has none,
-        and of friction and actuators.
+        t*, as a share of the link's second moment and mass in the robot file; in SI for a link
+        without values, and for friction and actuators.
     feasible : bool
         Whether t* >= 0, or whether the noise of the record explains t* < 0 (`within_noise`).
     physical : bool
         Whether some robot has these parameters, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
         Conditions (or limits) that prevent t* >= 0, in the order of their release, each with the t*
-        before; empty if t* >= 0.
+        before its release; empty if t* >= 0.
     chi : ndarray, shape (p,)
         Standard parameters at t*.
     """
@@ -163,9 +163,10 @@ def feasibility(
 def blocked(
     conditions: Sequence[Condition], rows: LinearBounds, space: Space, first: Optimum
 ) -> Iterator[tuple[str, float]]:
-    """Yield the conditions that no chi in a space fulfils, each with the margin t* before it.
+    """Yield the conditions that no chi in a space fulfils, each with the margin t* before its
+    release.
 
-    Each is the condition with the largest multiplier, which is then released. first : the optimum
+    The condition with the largest multiplier is yielded, and is then released. first : the optimum
     of `margin` with all conditions.
     """
     conditions, optimum = list(conditions), first
@@ -222,10 +223,10 @@ def nearest_standard(
     space = solutions(physical.rows(names), X, units(physical))
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
     criterion = np.diag(1 / scale), chi0 / scale
-    return nearest_in(space, physical, rows, start, criterion)
+    return nearest_physical(space, physical, rows, start, criterion)
 
 
-def nearest_in(
+def nearest_physical(
     space: Space,
     physical: PhysicalModel,
     rows: LinearBounds,
@@ -300,8 +301,8 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
 def scales(physical: PhysicalModel) -> Array:
     """Return a typical size of each standard parameter, shape (p,), in SI units.
 
-    They are the absolute values of the robot file, but at least a hundredth of a typical size; if
-    the file has no values, they are typical sizes.
+    The sizes are the absolute values of the robot file, but at least a hundredth of a typical size.
+    If the file has no values, typical sizes are used.
     """
     sizes = []
     for name in physical.standard:
@@ -315,8 +316,8 @@ def scales(physical: PhysicalModel) -> Array:
 def units(physical: PhysicalModel) -> Array:
     """Return the scales, shape (p,), by which the solver divides the unknown standard parameters.
 
-    For a link with values in the robot file they follow from the size of its condition (second
-    moment and mass); for all others they are `scales`.
+    For a link with values in the robot file, the scales follow from the size of its condition
+    (second moment and mass); all other scales are those of `scales`.
     """
     sizes = scales(physical)
     for j, condition in zip(physical.links, physical.conditions, strict=False):
@@ -329,7 +330,8 @@ def units(physical: PhysicalModel) -> Array:
 def pull_to_file(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
     """Make the penalty (prior) that pulls inertial parameters towards the robot file values.
 
-    None if there is no prior or its weight is 0. SettingsError if the file has no values of links.
+    Return None if there is no prior or its weight is 0. Raise SettingsError if the file has no
+    values of links.
     """
     if kind == "none" or weight == 0:
         return None

@@ -12,8 +12,8 @@ weights the rows as for ols ("none") and wls. Without a prior, the least-squares
 result if it is feasible.
 
 options (also all options of `runtime.physical.feasibility.RobotLimits`):
-    margin     smallest eigenvalue of every condition: of a link with values in the robot file as
-               share of its second moment and mass there (S_j), of others in SI; 1e-6
+    margin     smallest eigenvalue of every condition: for a link with values in the robot file,
+               as share of its second moment and mass there (S_j); for others, in SI; 1e-6
     prior      none | euclidean: distance D of the inertial parameters from the values of the robot
                file; "auto": euclidean if the file has values of links, else none
     weight     weight of D, a number; "held-out": the weight with which four fifths of the record in
@@ -50,7 +50,7 @@ from runtime.core.least_squares.linear import System, assemble, percent
 from runtime.core.least_squares.method import Beginning, Fitted, Method
 from runtime.core.least_squares.wls import by_weights
 from runtime.core.model import GeneratedModel
-from runtime.core.rows.factor import Array, Factor, factor, triangularise
+from runtime.core.rows.factor import Array, Factor, triangularise
 from runtime.core.rows.observation import Observation
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.limits import limits
@@ -82,8 +82,8 @@ class FeasibleOptions(RobotLimits):
     Attributes
     ----------
     margin : float
-        Smallest eigenvalue of every condition: of a link with values in the robot file as share of
-        its second moment and mass there, of others in SI.
+        Smallest eigenvalue of every condition: for a link with values in the robot file, as share
+        of its second moment and mass in this file; for others, in SI.
     prior : str
         Distance D of the inertial parameters from the values of the robot file: none or euclidean;
         auto: euclidean if the file has values of links, else none.
@@ -98,8 +98,8 @@ class FeasibleOptions(RobotLimits):
         links have a length, prismatic joints have limits, and the record does not contradict the
         bounds; null: no such bounds.
     explain : bool
-        Whether to name every condition that least squares breaks; false: only the parameters, in a
-        third of the time.
+        Whether to name every condition that least squares breaks; false: only the parameters are
+        computed, in a third of the time.
     linear : mapping
         Options of the least squares that starts the method: rank_tolerance, block.
     """
@@ -216,7 +216,8 @@ def within_limits(
 ) -> Feasibility:
     """Check whether base parameters X are physical and, if so, within the limits of the robot.
 
-    The two are separate because the limits are known or guessed values of a robot, not physics.
+    The two checks are separate because the limits are known or guessed values of a robot, not
+    physics.
     """
     judged = feasibility(physical, names, X, blame=options.explain)
     named = dict.fromkeys(limit_rows(physical, options).names)
@@ -270,13 +271,13 @@ def held_out_weight(
     """Choose the weight of the prior with which a fit best predicts data not used in this fit.
 
     Four fifths of the record predict the other fifth, five times; the product of the five errors is
-    smallest. A sum would be decided by a fifth that alone determines a parameter, since the others
-    predict it badly unless the prior is strong. If two weights are equally good, the larger is
-    chosen. A weight is abandoned as soon as it cannot be the best, since no prediction error is
-    below the error of least squares on the same fifth.
+    smallest. A sum of the errors would be decided by a fifth that alone determines a parameter,
+    since the other fifths predict it badly unless the prior is strong. If two weights are equally
+    good, the larger is chosen. A weight is abandoned as soon as it cannot be the best, since no
+    prediction error is below the error of least squares on the same fifth.
     """
-    number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
-    parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
+    folds = observation.columns(system.names).fold_factors(LIMIT.HELD_OUT_PARTS)
+    parts = [part.weighted(1 / np.array(system.scales)) for part in folds]
     others = [
         Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())
         for part in parts
@@ -390,8 +391,8 @@ def bounds_contradict(
 ) -> bool:
     """Whether mass and centre-of-mass bounds guessed from the robot size contradict the record.
 
-    The bounds contradict the record if they raise the residual norm by more than the factor
-    LIMIT.WEIGHT_INCREASE, or if no robot is within the bounds.
+    The bounds contradict the record if they raise the residual norm by more than a small factor
+    (WEIGHT_INCREASE in limits.toml), or if no robot is within the bounds.
     """
     if unbounded is None or bounded is None:
         return unbounded is not None
@@ -408,17 +409,6 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
     missing = len(physical.links) * 10 - len(known_inertia(physical))
     some = f" ({missing} parameters of links have no value and stay free)" if missing else ""
     return f"Values of the robot file as prior, {options.prior}, weight {weight:g}{some}."
-
-
-def part_factor(part: Observation, system: System) -> Factor:
-    """Compute the QR factor of [W Y] of a part of the record, weighted as the whole record.
-
-    The weights of the joints are those of the whole record.
-    """
-    chosen = part.columns(system.names)
-    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
-        1 / np.array(system.scales)
-    )
 
 
 def solve_feasible(

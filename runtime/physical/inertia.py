@@ -2,8 +2,8 @@
 
 Every link has a mass density, actuators have inertia, and friction dissipates power.
 
-Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
-about the origin of its frame (the elements XX .. ZZ as they are) and l = (MX, MY, MZ), the
+Base parameters are X = K chi, with chi the standard parameters. For link j, with J the inertia
+tensor about the origin of its frame (the elements XX .. ZZ as they are) and l = (MX, MY, MZ), the
 pseudo-inertia
 
     P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
@@ -128,7 +128,8 @@ class PhysicalModel:
     def smallest(self, chi: Array) -> dict[str, float]:
         """Compute the smallest eigenvalue of each physical condition, by name.
 
-        Each is relative to the scale of its condition. No value is negative for a physical robot.
+        Each eigenvalue is relative to the scale of its condition. For a physical robot, no
+        eigenvalue is negative.
         """
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
@@ -180,7 +181,7 @@ def physical_model(
 def pseudo_inertia(ten: Array) -> Array:
     """Build the pseudo-inertia P_j, shape (4, 4), from the ten inertial parameters of a link.
 
-    The parameters are in the order of INERTIAL, about the origin of the link frame.
+    The parameters are XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M, about the origin of the link frame.
     """
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
@@ -276,7 +277,7 @@ def _coupled(groups: Sequence[set[int]]) -> list[set[int]]:
 def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
     """Compute the origins of all frames in frame 0, m, at the joint positions q, shape (K, n).
 
-    The result has shape (K, frames, 3). It is None if the model has no frame poses, or if a
+    The result has shape (K, frames, 3). The result is None if the model has no frame poses, or if a
     kinematic loop does not close.
     """
     poses = getattr(model, "frame_poses", None)

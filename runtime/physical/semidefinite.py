@@ -183,8 +183,8 @@ class Program:
 
     The unknowns are w. The program is built constraint by constraint.
 
-    It starts with the constraint P >= least S of every condition, or P >= t S with an unknown t,
-    and with the linear rows. The criterion may add further unknowns.
+    The program starts with the constraint P >= least S of every condition, or P >= t S with an
+    unknown t, and with the linear rows. The criterion may add further unknowns.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ class Program:
         self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
-        """Solve the program with the tightest tolerances that Clarabel reaches (TOLERANCES)."""
+        """Solve the program with the tightest tolerances that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
         status = ""
         Q = np.diag(self.diagonal)
@@ -365,7 +365,7 @@ class Quadratic:
     def minimum(self, A: Array, g: Array) -> Array:
         """Find the standard parameters chi, shape (p,), that minimise 1/2 chi'A chi - g'chi.
 
-        chi is that of a physical robot; zeros if Clarabel finds no minimum.
+        chi belongs to a physical robot; the result is zeros if Clarabel finds no minimum.
         """
         squares = (A * self.scale * self.scale[:, None])[self.upper]
         linear = -g * self.scale
@@ -383,8 +383,9 @@ class Quadratic:
     def _solver(self, squares: Array, linear: Array, *, scaled: bool) -> Any:
         """Make a Clarabel solver whose quadratic criterion can be changed later.
 
-        So Clarabel must not remove anything from the program. scaled : the unknowns are near one,
-        and Clarabel does not scale them again, which saves half of the time.
+        For this purpose, Clarabel must not remove anything from the program. scaled : whether the
+        unknowns are near one, so that Clarabel does not scale them again, which saves half of the
+        time.
         """
         settings = _clarabel().DefaultSettings()
         settings.verbose = False

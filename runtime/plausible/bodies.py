@@ -6,9 +6,9 @@ with the best weights, in nats,
 
     score = N sum_j log(sigma_j) + D(chi),   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
 
-N is the number of independent rows of a joint, which is smaller than that of its rows; a difference
-of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was
-measured, also if a cause changes the torques (`runtime.plausible.trials`).
+N is the number of independent rows of a joint, which is smaller than the number of its rows; a
+difference of 5 is a likelihood ratio of 150. Rows j are those of a torque as it was measured, also
+if a cause changes the torques (`runtime.plausible.trials`).
 
 `Bodies` minimises half the weighted squares and D over the standard parameters of a physical robot
 (`runtime.physical.inertia`): every pseudo-inertia P >= 0, motor inertias and frictions c >= 0, and
@@ -93,8 +93,8 @@ class Grams:
     def sigma(self, X: Array) -> Array:
         """Compute the root mean square residual of each joint, shape (n,).
 
-        It is at least LIMIT.RESIDUAL_FLOOR of the torque of the joint, and 1 for a joint without
-        rows.
+        The residual is at least a small share (RESIDUAL_FLOOR in limits.toml) of the torque of the
+        joint, and 1 for a joint without rows.
         """
         N = np.maximum(self.rows, 1)
         square = np.maximum(self.squares(X), LIMIT.RESIDUAL_FLOOR**2 * self.measured) / N
@@ -187,13 +187,13 @@ class Bodies:
     Attributes
     ----------
     known_links : ndarray of bool, shape (links,)
-        Whether each link is drawn towards its values in the robot file.
+        Whether the penalty draws each link towards its values in the robot file.
     H, h, constant
         Distance from these values: 1/2 chi'H chi - h'chi + constant.
     heavy : ndarray, shape (p,), nats
-        Price of the masses of links without values.
+        Penalty on the masses of links without values.
     price : ndarray, shape (p,), nats
-        Weak price of the parameters that no known value bounds.
+        Weak penalty on the parameters that no known value bounds.
     """
 
     def __init__(
@@ -260,7 +260,7 @@ class Bodies:
     def _of_file(self, link: Condition, length: float) -> Array | None:
         """Compute the pseudo-inertia P0 of a link from its values in the robot file.
 
-        None if the file does not give all ten parameters, or if no body can have them.
+        Return None if the file does not give all ten parameters, or if no body can have them.
         """
         known = self.physical.values
         ten = np.array([known.get(self.physical.standard[k], np.nan) for k in link.numbers])
@@ -274,7 +274,7 @@ class Bodies:
     def _motor_inertia(self, element: Condition) -> float:
         """Look up the value of a motor inertia Ia in the robot file.
 
-        0 for other elements, or if the file does not give the value.
+        The result is 0 for other elements, or if the file does not give the value.
         """
         names = [self.physical.standard[k] for k in element.numbers]
         single = len(names) == 1 and names[0].startswith("Ia")
@@ -284,7 +284,7 @@ class Bodies:
         """Add a penalty on the distance of some parameters, given by their indices, from known
         values.
 
-        It is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
+        The penalty is 1/2 x'near x - linear'x + size/2/tolerance^2, x the parameters.
         """
         self.H[np.ix_(numbers, numbers)] += near
         self.h[numbers] += linear
@@ -303,7 +303,7 @@ class Bodies:
         """Compute the penalty D, in nats, that is added to the cost of a fit for standard
         parameters chi.
 
-        It is the distance from known values, plus a price for the masses of links without values.
+        D is the distance from known values, plus a penalty on the masses of links without values.
         """
         return self.distance(chi) + float(self.heavy @ chi)
 
@@ -319,9 +319,9 @@ class Bodies:
         """Compute the Hessian matrix of the penalty D plus a barrier that keeps the parameters
         physical.
 
-        The barrier is logarithmic, has the weight LIMIT.WEAK_PRICE, and bounds the parameters by
-        the physical conditions. It makes the matrix large in the directions in which parameters
-        would leave their bounds.
+        The barrier is logarithmic, has a small weight (WEAK_PRICE in limits.toml), and bounds the
+        parameters by the physical conditions. The barrier makes the matrix large in the directions
+        in which parameters would leave their bounds.
         """
         B = self.H.copy()
         sizes = [

@@ -94,7 +94,8 @@ class Case:
     def limits(self, key: str, *shape: int) -> Array | None:
         """Read the limits of q, qd, qdd or tau (`key`) of each joint from the robot file.
 
-        Return an array of shape (n, *shape), or None if the file does not give them in this shape.
+        Return an array of shape (n, *shape), or None if the file does not give limits of this
+        shape.
         """
         given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
         return given if given.shape == (self.samples.n, *shape) else None
@@ -103,22 +104,27 @@ class Case:
         """List the labels of the joints that the mask `chosen` selects, separated by commas."""
         return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
-    def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
+    def reaching(
+        self, values: Array, units: Sequence[str], chosen: Array, limits: Array | None = None
+    ) -> str:
         """Write the values that the selected joints reach, such as "Largest values: 3 rad (joint 2)".
 
-        At most four joints are named. If the mask selects none, the joint with the largest value is
-        named.
+        At most four joints are named, with their limits: "(joint 2, limit 1)". If the mask selects
+        none, the joint with the largest value is named, without its limit.
         """
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
-        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
+        limit = [""] * len(values)
+        if limits is not None and chosen.any():
+            limit = [f", limit {x:.3g}" for x in limits]
+        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]}{limit[j]})" for j in shown)
         return f"Largest values: {', '.join(each)}"
 
     @cached_property
     def observation(self) -> Observation | None:
         """Observation matrix W and torques Y of all records, with the study as given.
 
-        None if they cannot be computed, for instance if no row is left. MemoryTooSmallError if they do
-        not fit the memory.
+        The result is None if they cannot be computed, for instance if no row is left. Raises
+        MemoryTooSmallError if they do not fit into the memory.
         """
         try:
             return stacked(self.model, self.given)
@@ -131,7 +137,7 @@ class Case:
     def physical(self) -> PhysicalModel | None:
         """Conditions that the parameters of a physical robot satisfy, such as positive masses.
 
-        None if the model has no standard parameters.
+        The value is None if the model has no standard parameters.
         """
         try:
             return physical_model(self.model)
@@ -162,7 +168,7 @@ class Case:
     def unfit(self) -> str:
         """Reason why no model can be fitted, for instance a torque that never changes.
 
-        An empty string if a model can be fitted.
+        The text is empty if a model can be fitted.
         """
         if self.physical is None:
             return "the model has no standard parameters"
@@ -199,7 +205,7 @@ class Case:
     def baseline(self) -> Baseline | None:
         """Reference fit: the records are fitted with unchanged settings of the study.
 
-        None if nothing can be fitted.
+        The value is None if nothing can be fitted.
         """
         return None if self.silent else self._baseline(values=True)
 
@@ -207,7 +213,7 @@ class Case:
     def validation(self) -> Baseline | None:
         """Reference fit `baseline`, prepared to predict the torques of the validation records.
 
-        None if there are no validation records, or if they cannot be used.
+        The value is None if there are no validation records, or if they cannot be used.
         """
         if self.baseline is None or not self.unseen:
             return None
@@ -244,7 +250,7 @@ class Case:
     def robot_values(self) -> KnownValues | None:
         """Comparison of torques computed from the robot file's values with measured torques.
 
-        None if the file has no values, or if nothing can be fitted.
+        The value is None if the file has no values, or if nothing can be fitted.
         """
         if self.unfit:
             return None
@@ -263,7 +269,7 @@ class Case:
     def noise_floor(self) -> float:
         """Relative torque error that noise of the positions alone may cause, %.
 
-        It is 100 NOISE_MADE sqrt(a), with a the largest share of noise in the power of an
+        The floor is 100 NOISE_MADE sqrt(a), with a the largest share of noise in the power of an
         acceleration. Errors below this floor are no evidence for a cause.
         """
         median = self.study.signals.median
@@ -272,9 +278,10 @@ class Case:
 
     @cached_property
     def late(self) -> Delay | None:
-        """Estimated delay of the torques against the positions, in the longest record.
+        """Estimated delay of the torques relative to the positions, in the longest record.
 
-        None if it cannot be estimated, for instance because the record is too short.
+        The value is None if the delay cannot be estimated, for instance because the record is too
+        short.
         """
         through = max(self.through, key=lambda one: len(one.record))
         t = through.record.t

@@ -7,7 +7,7 @@ of frames that corrects the error:
     q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd
     tau' = T tau - s known - rho,    free_... = another value
 
-    CAUSES     a sign, an order, a unit: one change each, some 10 n^2 of a robot of n joints
+    CAUSES     a sign, an order, a unit: one change each, about 10 n^2 for n joints
     NUMBERS    a factor, a zero, a length: one unknown number xi each, zero in the study as given
 
 A new cause is a row (docs/contributing.md). `runtime.plausible.trials` tries them.
@@ -130,9 +130,8 @@ class Cause:
         return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
     def subtracted(self, samples: Samples) -> Array:
-        """Compute the torques that the model lacks; they are subtracted from the measured torques.
-
-        They are s known + rho, shape (K, n).
+        """Compute the torques that the model lacks, s known + rho, shape (K, n), which are
+        subtracted from the measured torques.
         """
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
@@ -145,7 +144,7 @@ def unmodelled_torques(samples: Samples) -> Array:
 
     Both have unit size; the shape is (K, n, 2). The constant is 1, the friction
 
-    sign(qd) exp(-(qd/v)^2), with v the share LIMIT.SLOW of the largest speed.
+    sign(qd) exp(-(qd/v)^2), with v a small share (SLOW in limits.toml) of the largest speed.
     """
     qd = samples.qd
     v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
@@ -175,7 +174,7 @@ class Robot:
     column_units : mapping of str to tuple of str, optional
         Units of the columns q and tau in the files, one for each joint; default: not known.
     friction : ndarray, shape (n,), N m or N, optional
-        Friction at low speed that the model lacks, to first order; None if it is certain in no
+        Friction at low speed that the model lacks, to first order; None if it is certain for no
         joint.
     """
 
@@ -237,7 +236,7 @@ class Robot:
     def gravity(self) -> Array:
         """Gravity vector of the robot file in frame 0, shape (3,), m/s^2.
 
-        It is zero if the Robot was made without `variants`.
+        The vector is zero if the Robot was made without `variants`.
         """
         return np.array([self.free.get(key, 0.0) for key in GRAVITY])
 
@@ -245,7 +244,7 @@ class Robot:
     def frames(self) -> list[int]:
         """Numbers of the frames whose geometry may be altered to test the robot file for errors.
 
-        Frames of constrained joints are not among them.
+        Frames of constrained joints are left out.
         """
         entries = (ENTRY.fullmatch(key) for key in self.free)
         return sorted(int(entry[2]) for entry in entries if entry and entry[1] == "alpha")
@@ -258,7 +257,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Row:
-    """One kind of possible error (a row of the tables CAUSES and NUMBERS), and how to correct it.
+    """One kind of possible error (a row of the table `CAUSES` or `NUMBERS`), and how to correct it.
 
     Attributes
     ----------
@@ -267,12 +266,12 @@ class Row:
         Yields the items for which the cause is tried, for instance joints.
     says, remedy, subject : str
         Sentences with the words of an item in braces; the default of `subject` is `says`.
-    maps : function of the Robot, the item and, in NUMBERS, xi
+    maps : function of the Robot, the item and, in the table `NUMBERS`, xi
         Returns the fields of the Cause that change the samples or the table of frames.
     span : float
-        In NUMBERS, the largest |xi| to which the search extends.
+        In the table `NUMBERS`, the largest |xi| to which the search extends.
     words : function of the Robot, the item and xi
-        In NUMBERS, returns words of the sentences that depend on xi.
+        In the table `NUMBERS`: returns the words of the sentences that depend on xi.
     change : function of the Robot and the item
         Returns the remedy as settings of the study.
     """
@@ -290,7 +289,7 @@ class Row:
     def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
         """Make the `Cause` of this kind of error for one item, for instance for one joint.
 
-        Rows of NUMBERS also need xi, the unknown number.
+        Rows of the table `NUMBERS` also need xi, the unknown number.
         """
         words = {**item, **(self.words(robot, item, *xi) if xi else {})}
         says, change = self.says.format(**words), self.change(robot, item)
@@ -392,7 +391,7 @@ def torque_unit_of_joints(robot: Robot) -> Iterator[Item]:
 def position_units(robot: Robot) -> Iterator[Item]:
     """Yield each possible mistake in the unit of all positions, such as degrees read as rad.
 
-    It concerns all revolute joints or all prismatic joints.
+    The mistake concerns all revolute joints or all prismatic joints.
     """
     for unit, factor, turning, read, mistake in (
         ("deg", DEGREE, True, ("rad",), "degrees are read as rad"),
@@ -423,7 +422,7 @@ def of_each_joint(robot: Robot, items: Iterator[Item]) -> Iterator[Item]:
 
 
 def rates(robot: Robot) -> Iterator[Item]:
-    """Yield each factor by which the sampling rate may be wrong (LIMIT.RATE_FACTORS)."""
+    """Yield each factor by which the sampling rate may be wrong (RATE_FACTORS in limits.toml)."""
     for factor in LIMIT.RATE_FACTORS:
         yield {"factor": factor, "times": times(factor)}
 
@@ -472,7 +471,8 @@ def with_constants(robot: Robot) -> Iterator[Item]:
 
 
 def with_offsets(robot: Robot) -> Iterator[Item]:
-    """Yield one empty mapping, for an error of the position offsets; nothing without them.
+    """Yield one empty mapping, for an error of the position offsets; nothing for a robot without
+    offsets.
 
     The offsets may be missing or wrong.
     """
@@ -482,7 +482,7 @@ def with_offsets(robot: Robot) -> Iterator[Item]:
 def other_ratios(robot: Robot) -> Iterator[Item]:
     """Yield each pair of joints with different gear ratios: they may have been exchanged.
 
-    Only if positions or torques of the files are on the side of the motors.
+    Nothing is yielded unless positions or torques of the files are on the side of the motors.
     """
     ratio = np.diag(robot.R)
     for item in pairs(robot) if "motor" in robot.sides else ():
@@ -563,7 +563,7 @@ def exchanged_lengths(robot: Robot) -> Iterator[Item]:
 def odd_tables(robot: Robot) -> Iterator[Item]:
     """Yield all lengths of the table of frames times 1000, then times 1/1000 (mm for m, m for mm).
 
-    Only if the longest length is too long or too short for an arm.
+    Nothing is yielded unless the longest length is too long or too short for an arm.
     """
     given = {
         key: x for key, x in robot.free.items() if key[:6] in ("free_d", "free_r", "free_b") and x
@@ -577,8 +577,8 @@ def odd_tables(robot: Robot) -> Iterator[Item]:
 def conventions(robot: Robot) -> Iterator[Item]:
     """Yield the table of frames converted from the distal convention to Khalil's, and the reverse.
 
-    To convert it, alpha and d of each frame are copied from the frame before or after. This
-    corrects a table that is read in the wrong one of the two conventions.
+    To convert the table, alpha and d of each frame are copied from the frame before or after. The
+    conversion corrects a table that is read in the wrong convention.
     """
     for step, mistake, remedy in (
         (
@@ -615,7 +615,7 @@ def entries(robot: Robot, names: str) -> Iterator[Item]:
 def slow_joints(robot: Robot) -> Iterator[Item]:
     """Yield one possible error: the model lacks friction at low speed in some joints.
 
-    Nothing is yielded if no joint certainly has such friction.
+    Nothing is yielded if such friction is certain for no joint.
     """
     if robot.friction is not None:
         names = ", ".join(robot.labels[j] for j in np.flatnonzero(robot.friction))
@@ -682,8 +682,8 @@ def changed_unit(
     chosen : ndarray of bool, shape (n,)
         The joints whose unit changes.
     read : sequence of str
-        Names of the unit in which their columns are read by mistake. If the study gives them
-        another unit, the setting is left out.
+        Names of the unit in which their columns are read by mistake. If the study gives these
+        columns another unit, the setting is left out.
     unit : str
         Unit to set.
     """
@@ -720,7 +720,7 @@ def coupled(robot: Robot, item: Item, *, positions: bool, torques: bool) -> Maps
 def constants_as_currents(robot: Robot) -> Array:
     """Compute the matrix that removes torque constants which were applied by mistake, shape (n, n).
 
-    It multiplies the torques of the joints.
+    The matrix multiplies the torques of the joints.
     """
     return np.asarray(robot.R.T @ np.linalg.inv(robot.constant) @ np.linalg.inv(robot.R).T)
 
@@ -1217,6 +1217,6 @@ NUMBERS = (
 def causes(robot: Robot) -> list[Cause]:
     """List the possible errors (causes) of the study and of the table of frames for a given robot.
 
-    They are those of the table CAUSES, without an unknown number.
+    The list has the errors of the table `CAUSES`, which have no unknown number.
     """
     return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]

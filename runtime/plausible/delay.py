@@ -1,16 +1,17 @@
-"""Estimate the delay of the torque of each joint against its position, with standard deviations.
+"""Estimate the delay of the torque of each joint relative to its position, with standard
+deviations.
 
     Y_j(t) = [W_j X](t - delta_j) + rho
     Y_j(t + delta) = W_j X - (delta_j - delta) d/dt(W_j X) + ...
 
 X and all delta_j are estimated together by Gauss-Newton steps: torques are shifted by the last
-delta (cubic interpolation of the filtered signal), W stays. The start is the best common shift of a
-grid. Rows near a reversal are left out for columns sign(qd), which have no derivative there and
-whose step the filter smears. The standard deviation is the larger of two: that of least squares,
-and that between blocks of time that are assumed to be independent.
+delta (cubic interpolation of the filtered signal), and W stays the same. The iteration starts from
+the best common shift of a grid. Rows near a reversal are left out for columns sign(qd), which have
+no derivative there and whose step the filter smears. The standard deviation is the larger of two:
+that of least squares, and that between blocks of time that are assumed to be independent.
 
-Controllers and field buses often cause a delay of a few ms; at 1 Hz and 10 rad/s^2 it costs some
-per cent of the torque.
+Controllers and field buses often cause a delay of a few ms; at 1 Hz and 10 rad/s^2, such a delay
+changes the torque by some per cent.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Delay(Result):
-    """Delay of the torque of each joint against its position; positive if the torque is late.
+    """Delay of the torque of each joint relative to its position; positive if the torque is late.
 
     Attributes
     ----------
@@ -45,8 +46,8 @@ class Delay(Result):
     shift, sigma : ndarray, shape (n,), s
         Delay of each joint, and its standard deviation; nan for a joint that does not move enough.
     common, sigma_common : float, s
-        Weighted mean over the joints, and its standard deviation: the larger one of that computed
-        from sigma and that computed from the scatter of the delays.
+        Weighted mean over the joints, and its standard deviation: the larger of two, computed from
+        sigma and from the scatter of the delays.
     before, after : ndarray, shape (n,), %
         Relative error 100 ||Y_j - W_j X|| / ||Y_j|| without and with the delays.
     """
@@ -149,7 +150,7 @@ def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
 class Shifts:
     """Least-squares problem of one record whose torques can be shifted in time.
 
-    It holds W and its time derivative at some instants.
+    The problem stores W and its time derivative at some instants.
     """
 
     def __init__(self, model: GeneratedModel, through: Filtered, longest: float) -> None:

@@ -5,8 +5,8 @@ The samples are fitted twice by least squares, with joints weighted by the size 
     tau = D X + c,        tau = D X + c + F,        F_j = a_j qd_j + b_j sign(qd_j)
 
 with a constant c_j and F_j in the joints whose elements in the robot file have no friction. A joint
-lacks friction if F takes away most of its error. Other causes of an error are not searched for then, because friction
-that the model lacks hides them.
+lacks friction if F takes away most of its error. In that case, other causes of an error are not
+searched for, because the missing friction hides them.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ WITHOUT_FRICTION = ("inertia", "offset", "stiffness", "cogging")
 def friction(case: Case) -> Answer | None:
     """Check whether joints without friction in the robot file show friction in the record.
 
-    None if every joint has friction, if nothing is fitted, or if sensors behind the gears measure
-    the torques, as these have no friction of the drives.
+    Return None if every joint has friction, if nothing is fitted, or if sensors behind the gears
+    measure the torques, which then contain no friction of the drives.
     """
     if case.alone is None or case.sides[1] == "link":
         return None
@@ -75,8 +75,8 @@ def with_friction(case: Case) -> Array:
 def errors(case: Case, chosen: Array, *added: Array) -> Array:
     """Compute the relative torque error of each joint, %, with further torques in some joints.
 
-    chosen : joints that have the torques besides those of the model, bool (n,). added : torques of
-    unit parameters, shape (K, n) each.
+    chosen : joints that have these further torques, bool (n,). added : torques of unit parameters,
+      shape (K, n) each.
     """
     s = case.samples
     mask = s.moving()

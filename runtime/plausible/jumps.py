@@ -1,12 +1,12 @@
 """Checks along the record: positions that jump or freeze, torques that are clipped.
 
-jumps      a step of q between two samples that differs from the steps around it by LIMIT.JUMP
-           times the usual change, and by more than any robot accelerates. Causes are an encoder
-           that dropped out, missing samples, angles that wrap, or two records joined into one
-frozen     a moving joint that suddenly holds one value for LIMIT.HELD samples
+jumps      a step of q between two samples that differs from the steps around it by JUMP times the
+           usual change, and by more than any robot accelerates. Causes are an encoder that dropped
+           out, missing samples, angles that wrap, or two records joined into one
+frozen     a moving joint that suddenly holds one value for HELD samples
 cut        the largest or the smallest torque is repeated in many samples, and a model that is
-           fitted to the other samples goes beyond it: the signal was clipped. If the drive
-           saturates and its true torque is recorded, the model does not go beyond it
+           fitted to the other samples predicts larger values: the signal was clipped. If the drive
+           saturates and its true torque is recorded, the model does not predict larger values
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def course_of(case: Case, record: Record) -> Course:
 
 
 def same_positions(case: Case, course: Course) -> Answer | None:
-    """Tell two joints that move and have the same positions in the file."""
+    """Report two joints that move and have the same positions in the file."""
     drives = drives_of(case.model) if case.sides[0] == "motor" else None
     q = course.record.q
     files = np.diff(q if drives is None else drives.motor_position(q), axis=0)
@@ -98,7 +98,7 @@ def same_positions(case: Case, course: Course) -> Answer | None:
 
 
 def frozen_encoder(case: Case, course: Course) -> Answer | None:
-    """Tell a joint that moves and whose position suddenly stays at one value."""
+    """Report a joint that moves and whose position suddenly stays at one value."""
     pairs = zip(course.steps.T, course.sharp.T, strict=True)
     frozen = np.array([_frozen(steps, sharp) for steps, sharp in pairs])
     if not frozen.any():
@@ -113,7 +113,7 @@ def frozen_encoder(case: Case, course: Course) -> Answer | None:
 
 
 def jumping_joints(case: Case, course: Course) -> Answer | None:
-    """Tell the joints of the first jump, its size, and its probable cause."""
+    """Report the joints of the first jump, its size, and its probable cause."""
     if not course.high.any():
         return None
     first, _ = course.jumps()
@@ -175,7 +175,7 @@ def _usual(x: Array) -> Array:
 def _frozen(steps: Array, sharp: Array) -> Array:
     """Find the instants at which a joint stops sharply and then holds one value, bool (N,).
 
-    The value must stay for LIMIT.HELD samples.
+    The value must stay for HELD samples (limits.toml).
 
     steps : size of each step between samples, shape (N - 1,).
     sharp : whether the speed changes sharply from one step to the next, bool (N - 2,).
@@ -224,8 +224,8 @@ def _wrap(course: Course) -> bool:
 def cut_torques(case: Case) -> Answer | None:
     """Check whether torques were clipped at their largest or smallest value.
 
-    A model that is fitted to the other samples predicts the torques there. None if no torque stays
-    at such a value, or if nothing is fitted.
+    A model that is fitted to the other samples predicts the torques at these values. The result is
+    None if no torque stays at such a value, or if nothing is fitted.
     """
     if case.silent:
         return None
@@ -285,7 +285,8 @@ def cut_torques(case: Case) -> Answer | None:
 def _at_bound(tau: Array) -> Array:
     """Whether each sample has the largest or the smallest torque of the record, bool (N,).
 
-    True only if the record repeats this value far more often than the values next to it.
+    The answer is True only if the record repeats this value far more often than the values next to
+    it.
     """
     held = np.zeros(len(tau), dtype=bool)
     span = float(np.ptp(tau))

@@ -3,12 +3,11 @@
     Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
     offset,
 
-by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. Viscous
-and dry friction are fitted whether the robot file has them or not, unless sensors behind the gears
-measure the torques. A part is left out if it is small or cannot be separated.
-
-Of a slide whose gravity force is constant, the offset of friction is left out instead, so that a_j
-is the ratio of the weights. No record shows a factor of this force: the mass hides it.
+by least squares for each joint: a_j = b_j = 1 if values, gear and sign are right. Viscous and dry
+friction are fitted whether the robot file has them or not, unless sensors behind the gears measure
+the torques. A part is left out if it is small or cannot be separated. For a slide whose gravity
+force is constant, the offset of friction is left out instead, so that a_j is the ratio of the
+weights. No record shows a factor of this force: the mass hides it.
 
 A second question: are the measured torques really torques? Motor currents change in time as the
 computed torques do, but have another size.
@@ -18,9 +17,9 @@ computed torques do, but have another size.
             X_0 the base parameters of the file's values
 
 Values of a maker's file are right to tens of per cent. If the measured torque of a joint is similar
-to the computed one (alike above LIMIT.TORQUE_ALIKE), but is less than 1/LIMIT.TORQUE_FACTOR or more
-than LIMIT.TORQUE_FACTOR of its size, it was measured in another unit or on the other side of the
-gear. Drivers of some arms publish motor currents as effort.
+to the computed one (alike_j above TORQUE_ALIKE in limits.toml), but is smaller or larger by more
+than a factor (TORQUE_FACTOR in limits.toml), it was measured in another unit or on the other side
+of the gear. Drivers of some arms publish motor currents as effort.
 """
 
 from __future__ import annotations
@@ -73,14 +72,16 @@ class KnownValues(Result):
     weight: Array
 
     def without_inertia(self) -> KnownValues:
-        """Leave out what needs accelerations: the ratios of inertia torques, and the errors."""
+        """Leave out the results that need accelerations: the ratios of inertia torques, and the
+        errors.
+        """
         unknown = np.full(len(self.joints), np.nan)
         return replace(self, inertia=unknown, error=unknown)
 
     def table(self) -> Table:
         """Tabulate, by joint, the ratios of measured to computed torque, and the relative error.
 
-        The error is that of the computed torque, in % of the measured one.
+        The error is that of the computed torque, in % of the measured torque.
         """
         rows = zip(self.joints, self.gravity, self.inertia, self.error, strict=True)
         return Table(
@@ -96,7 +97,7 @@ class KnownValues(Result):
 
     @property
     def other_weights(self) -> Array:
-        """Whether the weight on each slide is far from that of the values, bool (n,)."""
+        """Whether the weight on each slide is far from the weight in the robot file, bool (n,)."""
         low, high = LIMIT.WEIGHT_RATIOS
         return np.asarray(
             np.isfinite(self.weight) & ~((low <= self.weight) & (self.weight <= high))
@@ -104,22 +105,22 @@ class KnownValues(Result):
 
     @property
     def heavy(self) -> bool:
-        """Whether the measured gravity torques of all joints are far above, or all far below,
-        computed ones.
+        """Whether the measured gravity torques of all joints are far above, or all far below, the
+        computed torques.
 
-        All ratios are then on the same side of the range LIMIT.CAD_RATIOS. Wrong time stamps cannot
-        cause this.
+        All ratios are then on the same side of a range (CAD_RATIOS in limits.toml). Wrong time
+        stamps cannot cause such ratios.
         """
         ratios, (low, high) = self.gravity[np.isfinite(self.gravity)], LIMIT.CAD_RATIOS
         return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
 
     @property
     def factors(self) -> dict[str, float]:
-        """Factors of the measured torques by joint, as another unit or side of the gears makes them.
+        """Factors of the measured torques by joint, which another unit or side of the gears may cause.
 
         They are the ratios of measured to computed torques, if all are far below 1: each joint may
-        have a gear of its own, which multiplies its gravity and its inertia torque alike (within
-        LIMIT.CAD_RATIOS). Empty otherwise.
+        have its own gear, which multiplies its gravity and its inertia torque alike (within
+        CAD_RATIOS in limits.toml). The mapping is empty otherwise.
         """
         low, high = LIMIT.CAD_RATIOS
         found: dict[str, float] = {}
@@ -139,9 +140,10 @@ class KnownValues(Result):
     @property
     def off(self) -> tuple[str, ...]:
         """Sentences that name the joints whose measured torques differ too much from the computed
-        ones.
+        torques.
 
-        These are joints with ratios outside LIMIT.CAD_RATIOS, or with errors above LIMIT.CAD_ERROR.
+        The sentences name joints with ratios outside CAD_RATIOS, or with errors above CAD_ERROR
+        (limits.toml).
         """
         texts = []
         doubtful = set()
@@ -165,7 +167,7 @@ class KnownValues(Result):
 def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | None:
     """Compare torques computed from the inertial values of the robot file with measured torques.
 
-    None if the file does not give all ten values of any link.
+    Return None if there is no link for which the file gives all ten values.
 
     rotors : whether the measured torques include friction and rotors of the drives; false for
         sensors behind the gears.
@@ -223,7 +225,7 @@ def known_values(baseline: Baseline, *, rotors: bool = True) -> KnownValues | No
 
 
 def torque_unit(result: Identification) -> Doubt | None:
-    """Make a warning if the unit of the measured torques is doubtful; None if it is not."""
+    """Make a warning if the unit of the measured torques is doubtful; None if there is no doubt."""
     by_law = any(record.origin.by_law for record in result.records)
     doubt = torque_unit_doubt(result.model, result.observation, by_law)
     return Doubt("torque_unit", "Unit of the torques", f"{doubt}.") if doubt else None
@@ -233,7 +235,7 @@ def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: b
     """Write a question about the unit of the torques, if their size contradicts the robot file's
     values.
 
-    An empty string if nothing contradicts the unit, or if the file lacks values.
+    The text is empty if nothing contradicts the unit, or if the file lacks values.
     """
     values, standard = dict(getattr(model, "VALUES", {})), getattr(model, "STANDARD_PARAMETERS", ())
     inertial = [name for name in standard if name.rstrip("0123456789") in INERTIAL]

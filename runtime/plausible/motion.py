@@ -7,10 +7,11 @@ parameters are judged before anything is fitted, by
             rows of W_w, Y_w divided by the standard deviation of their torque, sigma_i as
             `runtime.core.rows.predicted` predicts it
 
-This is the predicted standard deviation of parameter i, in % of the value with which this parameter
-alone would make all of the measured torque. A larger value is not to be expected, so %sigma of the
-parameter is hardly below share_i. The torque noise is assumed to be white, with LIMIT.TORQUE_NOISE
-of the torque of the joint: a convention, since the noise is not known before the fit.
+share_i is the predicted standard deviation of parameter i, in % of the value with which this
+parameter alone would make all of the measured torque. A larger value is not to be expected, so that
+%sigma of the parameter is hardly below share_i. The torque noise is assumed to be white, and a
+fixed share of the torque of the joint (TORQUE_NOISE in limits.toml): a convention, since the noise
+is not known before the fit.
 """
 
 from __future__ import annotations
@@ -99,8 +100,9 @@ def standing_share(samples: Samples, study: Study) -> Array:
 def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
     """Propose a speed `rows.low_speed`, below which the samples of a joint are left out as resting.
 
-    In rad/s or m/s, one number for each joint; joints that rest in at most LIMIT.REST_SHARE of
-    their rows keep that of the study. None if all joints do.
+    The speeds are in rad/s or m/s, one for each joint; a joint that rests in few of its rows
+    (REST_SHARE in limits.toml) keeps the speed of the study. The result is None if all joints keep
+    theirs.
     """
     share = standing_share(samples, study)
     if share.max() <= LIMIT.REST_SHARE:
@@ -124,7 +126,7 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
 def motion_excites(case: Case) -> Answer | None:
     """Check whether the motion determines every parameter.
 
-    None if there are no rows, or if a joint rests in all records.
+    The result is None if there are no rows, or if a joint rests in all records.
     """
     if case.observation is None or case.samples.still.any():
         return None
@@ -134,7 +136,8 @@ def motion_excites(case: Case) -> Answer | None:
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
     """Check whether the rows of an observation matrix W determine every parameter.
 
-    None if W is rank-deficient, which the fit itself reports, or if a torque is zero throughout.
+    The result is None if W is rank-deficient, which the fit itself reports, or if a torque is zero
+    throughout.
     """
     try:
         shares = unexcited_shares(observation, signals, rate)
@@ -157,8 +160,8 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Answer |
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
     """Predict the standard deviation of each parameter, in % of the largest value that it can have.
 
-    A parameter has this value if it alone produces all measured torques. The result is share_i of
-    the module docstring, by parameter name. Raises LinAlgError if W is rank-deficient, and
+    A parameter has this value if it alone produces all measured torques. The result is share_i (see
+    the head of this module), by parameter name. Raises LinAlgError if W is rank-deficient, and
     InputError if a torque is zero throughout.
     """
     s = np.array(
@@ -174,7 +177,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
             f"all measured torques of joint {zero} are zero; give the columns of these torques in "
             "record.columns.tau"
         )
-    columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
+    columns = np.linalg.norm(observation.factor.weighted(1 / s).R11, axis=0)
     if not columns.all():
         raise np.linalg.LinAlgError("a column of the observation matrix is zero")
     weights = Weights(
@@ -195,7 +198,7 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
 def recorded_speeds(case: Case) -> Answer | None:
     """Compare recorded velocities with the derivatives of the positions: gain and time lag.
 
-    None if no velocities are recorded, or if the study does not use them.
+    The result is None if no velocities are recorded, or if the study does not use them.
     """
     own = max(case.straight, key=lambda one: len(one.record))
     record, signals = own.record, own.study.signals

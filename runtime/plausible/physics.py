@@ -30,7 +30,8 @@ Array = np.ndarray
 def not_asked(case: Case) -> Answer | None:
     """Report why a search for possible errors of the study is not made; None if it is made.
 
-    Too few samples are a doubt, because a wrong sign or unit would not be detected.
+    With too few samples, the answer is "doubtful", because a wrong sign or unit would not be
+    detected.
     """
     if not case.silent:
         return None
@@ -48,7 +49,7 @@ def not_asked(case: Case) -> Answer | None:
 def physics(case: Case) -> Answer | None:
     """Compare, for each joint, the torque error of a physical robot with that of free parameters.
 
-    None if nothing is fitted.
+    The result is None if nothing is fitted.
     """
     if case.alone is None:
         return None
@@ -78,7 +79,8 @@ def measured(case: Case) -> Answer | None:
     """Check that the torques were measured, not computed: measured torques show friction and noise.
 
     Friction is measured as a share of the torque of a joint, noise by fifth differences of the
-    samples. Sensors behind the gears measure noise only. None if the law of a controller gives the torques, or if nothing is fitted.
+    samples. Sensors behind the gears measure noise only. The result is None if the law of a
+    controller gives the torques, or if nothing is fitted.
     """
     if case.alone is None or any(record.origin.by_law for record in case.records):
         return None
@@ -123,7 +125,7 @@ def measured(case: Case) -> Answer | None:
 def size(case: Case) -> Answer | None:
     """Check whether the fitted total mass of the links suits the reach of the robot.
 
-    None if either is unknown, or if a torque is not in N m.
+    The result is None if mass or reach is unknown, or if a torque is not in N m.
     """
     in_newton = {*joint_torque_units(case.model)} == {"N m"}
     if case.alone is None or not case.alone.physical.links or not in_newton:
@@ -147,9 +149,10 @@ def size(case: Case) -> Answer | None:
     "of another robot",
 )
 def values(case: Case) -> Answer | None:
-    """Compare the torques computed from the robot file's values with the measured ones, by joint.
+    """Compare the torques computed from the robot file's values with the measured torques, by
+    joint.
 
-    None if the robot file has no values.
+    The result is None if the robot file has no values.
     """
     if case.robot_values is None:
         return None
@@ -195,8 +198,8 @@ def values(case: Case) -> Answer | None:
 def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     """Check for a time shift between positions and torques.
 
-    None if the record does not determine the shift. If another change of the study explains the
-    record better, the question stays open.
+    The result is None if the record does not determine the shift. If another change of the study
+    explains the record better, the question stays open.
     """
     late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
@@ -243,7 +246,7 @@ def explained(before: float, after: float) -> float:
 def _instead(leaves: str, joint: str, before: float, after: float) -> str:
     """Write how an error changes: "; with ... leaves 2.0 instead of 8.1 % of the torque ... unexplained".
 
-    An empty string if both errors are printed alike.
+    The result is an empty string if both errors are equal as printed.
     """
     a, b = f"{before:.1f}", f"{after:.1f}"
     return (
@@ -299,7 +302,7 @@ def late_gain(case: Case) -> float:
 def certain_joints(case: Case) -> Array:
     """Whether the torque of each joint is late beyond doubt, bool (n,).
 
-    All are false if correcting the delays gains less than LIMIT.LATE_GAIN.
+    All are false if correcting the delays gains too little (less than LATE_GAIN in limits.toml).
     """
     assert case.late is not None
     return np.asarray(late_joints(case.late) & (gain_of_delays(case, case.late) >= LIMIT.LATE_GAIN))

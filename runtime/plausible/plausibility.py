@@ -7,7 +7,7 @@ One call answers several questions, each with a Check:
     EXPLAINED    questions about causes (`runtime.plausible.causes`), which are tried if
                  `variants` is given or if another check is doubtful
 
-A new check is a function of a `Case` and its line in CHECKS (docs/contributing.md).
+A new check is a function of a `Case` and its line in the table `CHECKS` (docs/contributing.md).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from runtime.core.model import GeneratedModel, axes_of, require_no_channels
+from runtime.core.model import GeneratedModel, require_no_axes, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.result import Identification
 from runtime.ground.check import WORST, Check, worst_of
@@ -189,10 +189,6 @@ def plausibility_of(result: Identification, variants: GeneratedModel | None = No
         raise InputError(
             "record and study are not judged for poses at rest; the checks need a motion"
         )
-    if (axes := axes_of(result.model)) is not None:
-        raise InputError(
-            f"record and study are not judged for a robot with {axes[0]}; identify once {axes[1]}"
-        )
     return plausibility(result.problem, variants=variants)
 
 
@@ -211,11 +207,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
         table of frames are among them.
     """
     problem.require_motion("a check of slips")
-    if (axes := axes_of(problem.model)) is not None:
-        raise InputError(
-            f"plausibility of the record: not judged for a robot with {axes[0]}; identify once "
-            f"{axes[1]}"
-        )
+    require_no_axes(problem.model, "the check of record and study")
     at("plausibility of the record")
     first = times(problem.records)
     case = case_of(problem, variants)

@@ -1,7 +1,7 @@
-"""Check whether torques have their sign: registers with a bit for the sign, and magnitudes.
+"""Check whether torques have lost their sign: unsigned registers, and magnitudes.
 
-A register that is read as an unsigned number gives torques which jump where they change their sign.
-Read as
+A register that is read as an unsigned number gives torques that jump where they change their sign.
+If the register is read as
 
     sign and magnitude     y = x below 2^k u, else -(x - 2^k u)       u: step of the register
     two's complement       y = x below 2^k u, else x - 2^(k+1) u
@@ -30,7 +30,9 @@ Array = np.ndarray
     "no jumps by a power of two of the smallest step, and no kinks at zero",
 )
 def signed(case: Case) -> Answer | None:
-    """Check whether torques are unsigned registers or magnitudes; None if there is no sign of it."""
+    """Check whether torques are unsigned registers or magnitudes; return None if nothing indicates
+    this.
+    """
     if any(record.origin.by_law for record in case.records):
         return None
     drives = drives_of(case.model) if case.sides[1] == "motor" else None
@@ -95,7 +97,7 @@ def register_bit(x: Array) -> tuple[int, bool] | None:
 def kinks_at_zero(x: Array, rate: float) -> int:
     """Count the kinks of a torque x, shape (N,), where it touches zero and turns back.
 
-    0 if x changes its sign.
+    The result is 0 if x changes its sign.
     """
     if x.min() * x.max() < 0:
         return 0

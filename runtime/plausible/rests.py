@@ -7,8 +7,9 @@ its rows is judged by
     X = argmin ||Y - W X||_w over the rows without rests (weights by joint)
     a_j^2, b_j^2 = mean of (Y - W X)^2 over the rows of joint j without rests, and over all of them
 
-Its rests are left out (`rows.low_speed` = v_j) if a_j < REST_ERROR b_j. Rows within REST_REACH
-instants of the decimation contain a part of the torque of a rest, and go with it (`rows.around`).
+The rests of joint j are left out (`rows.low_speed` = v_j) if a_j < REST_ERROR b_j. Rows within
+REST_REACH instants of the decimation contain a part of the torque of a rest, and are left out with
+the rest (`rows.around`).
 
 The rests of a joint are kept if the other rows do not determine its own friction and offset, or if
 W loses rank without them.
@@ -44,7 +45,8 @@ SMOOTH = ("inertia", "viscous", "offset", "stiffness", "cubic")
 def rows_at_rest(problem: Problem) -> Problem:
     """Replace the setting `rows.low_speed: auto` by speeds, zero for joints whose rests are kept.
 
-    This is a step of the preparation of a problem, and says in one sentence what is left out.
+    This is a step of the preparation of a problem, and notes in one sentence which rows are left
+    out.
     """
     try:
         whole = with_speeds(problem, np.zeros(len(problem.model.JOINTS)))
@@ -69,7 +71,7 @@ def rows_at_rest(problem: Problem) -> Problem:
 def with_speeds(problem: Problem, speeds: Array) -> Problem:
     """Return the problem whose rows slower than `speeds`, shape (n,), and near these are left out.
 
-    Speeds that are all zero give rows.low_speed: 0, rows.around as it is.
+    If all speeds are zero, rows.low_speed becomes 0, and rows.around stays as it is.
     """
     rows, low = problem.settings.rows, tuple(map(float, speeds))
     around = max(
@@ -136,7 +138,8 @@ def without_loss(
 ) -> Array:
     """Set to zero the speeds of joints whose rests are needed, shape (n,).
 
-    If not all rests can go, they go joint by joint in the given order, as far as they can.
+    If not all rests can be left out, they are left out joint by joint in the given order, as far as
+    possible.
     """
     rank = weighted_system(observation).solve().rank
 
@@ -161,8 +164,8 @@ def without_loss(
 def friction_determined(model: GeneratedModel, rows: Observation, j: int) -> bool:
     """Whether the rows of joint j (from 0) determine the friction and the offset of this joint alone.
 
-    The condition number of their columns, of norm 1, must be below LIMIT.FRICTION_CONDITION: a
-    joint that moves in one direction only does not separate FS from OFFSET.
+    The condition number of their columns, of norm 1, must be small (below FRICTION_CONDITION in
+    limits.toml): a joint that moves in one direction only does not separate FS from OFFSET.
     """
     own = [
         column
@@ -177,7 +180,7 @@ def friction_determined(model: GeneratedModel, rows: Observation, j: int) -> boo
 
 
 def disobeying(observation: Observation, moving: Array) -> Array:
-    """Tell of which joints the residuals at rest are larger than those in motion, bool, shape (n,).
+    """Find the joints whose residuals at rest are larger than those in motion, bool, shape (n,).
 
     moving : rows without rests, bool, shape (r,).
     """

@@ -2,7 +2,7 @@
 
 Filters are linear: a change of sign, scale or column order has the same effect before and after
 filtering, and a wrong sampling rate scales velocities and accelerations. So a cause needs only the
-regressor at these instants, and not even this if it leaves the positions as they are.
+regressor at these instants; a cause that does not change the positions needs no new regressor.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Samples:
     def constant(self) -> Array:
         """Whether the torque of each joint never changes, bool (n,).
 
-        False for a joint without a motor, whose torque is zero throughout.
+        The value is False for a joint without a motor, whose torque is zero throughout.
         """
         size = np.abs(self.tau).max(axis=0)
         return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
@@ -104,7 +104,8 @@ class Samples:
 def moving(qd: Array) -> Array:
     """Whether each joint moves at each sample, bool (K, n).
 
-    A joint moves if its speed is above LIMIT.STANDING times its largest speed.
+    A joint moves if its speed is above a small share (STANDING in limits.toml) of its largest
+    speed.
     """
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
@@ -112,8 +113,8 @@ def moving(qd: Array) -> Array:
 def excerpts(reading: Prepared) -> list[Prepared]:
     """Cut a few excerpts from a long record, spread evenly over the time window of the study.
 
-    LIMIT.EXCERPTS gives the number of excerpts and the samples of each. A shorter record stays
-    whole.
+    The number of excerpts and the samples of each are EXCERPTS in limits.toml. A shorter record
+    stays whole.
     """
     record = reading.record
     start, stop = window_of(record.t, reading.study.rows.window, record.name)
@@ -146,8 +147,8 @@ class Filtered:
     record : Record
     study : Study
     low : Lowpass
-        Its cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion if that
-        is lower.
+        Low-pass whose cut-off is that of the study, or a multiple (DYNAMIC in limits.toml) of the
+        frequency of the motion if this is lower.
     states : States
         q, qd, qdd, shape (N, n) each.
     """
@@ -173,7 +174,8 @@ def filtered(reading: Prepared, study: Study) -> Filtered:
 
 
 def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
-    """Filter all records, and select at most LIMIT.INSTANTS_KEPT samples of all records together.
+    """Filter all records, and select at most INSTANTS_KEPT samples (limits.toml) of all records
+    together.
 
     The samples are inside the time window of the study, `rows.window`.
 
@@ -193,8 +195,9 @@ def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
 def motion_cutoff(record: Record, study: Study) -> float:
     """Choose the cut-off of the low-pass for the motion of a record, Hz.
 
-    It is the cut-off of the study, or LIMIT.DYNAMIC times the frequency of the motion if that is
-    lower. Of the power of the velocities, 95 % lie below the frequency of the motion.
+    The result is the cut-off of the study, or a multiple (DYNAMIC in limits.toml) of the frequency
+    of the motion if this is lower. The frequency of the motion is that below which 95 % of the
+    power of the velocities lie.
     """
     low = study.signals.lowpass
     most = min(low.hertz if low is not None else np.inf, 0.4 * record.rate)
@@ -223,8 +226,8 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 def _instants(through: Filtered, number: int) -> Samples:
     """Select samples of one filtered record, about 0.4/f seconds apart (f: cut-off frequency).
 
-    If a long record gives fewer than LIMIT.INSTANTS_LEAST samples, twice as many are selected. The
-    first and last 2/f seconds of the time window are left out.
+    If a long record gives fewer than INSTANTS_LEAST samples (limits.toml), twice as many are
+    selected. The first and last 2/f seconds of the time window are left out.
     """
     record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known

@@ -2,10 +2,10 @@
 
     qdd_f (1 - (sin w / w)^2),    w = 2 pi f / rate
 
-is what two central differences lose of the acceleration qdd_f of frequency f. The share of a joint is
-the root of the power lost, over the root of the power of its acceleration below the cut-off of the
-low-pass. Logs of learning (10 to 50 Hz) lose much of fast motions; the fit then takes accelerations
-that are too small, and no other record shows this.
+is what two central differences lose of the acceleration qdd_f of frequency f. The share of a joint
+is the root of the power lost, over the root of the power of its acceleration below the cut-off of
+the low-pass. Logs recorded for machine learning (10 to 50 Hz) lose much of fast motions; the fit
+then uses accelerations that are too small, and no other record shows this error.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ Array = np.ndarray
     f"differences of the positions lose at most {100 * LIMIT.LOST_ACCELERATION:g} % of the accelerations",
 )
 def sampled(case: Case) -> Answer | None:
-    """Check how much of the accelerations the sampling rate loses; None if it is little."""
+    """Check how much of the accelerations the sampling rate loses; return None if the loss is
+    small.
+    """
     record = min(case.records, key=lambda one: one.rate)
     lost = lost_accelerations(record, case.study.signals)
     worst = int(np.argmax(lost))

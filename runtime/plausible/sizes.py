@@ -88,16 +88,19 @@ def positions(case: Case) -> Answer:
     limits = case.limits("q", 2)
     if limits is not None:
         room = limits[:, 1] - limits[:, 0]
-        excess = np.maximum(limits[:, 0] - low, high - limits[:, 1])
-        out, far = excess > (LIMIT.LIMIT_EXCESS - 1) * room, high - low > 2 * room
+        below, above = limits[:, 0] - low, high - limits[:, 1]
+        out = np.maximum(below, above) > (LIMIT.LIMIT_EXCESS - 1) * room
+        far = high - low > 2 * room
+        end, bound = (np.where(below > above, *pair) for pair in ((low, high), limits.T))
         limit = "limits.q of the robot file"
     else:
         angle, travel = LIMIT.LARGEST_ANGLE, LIMIT.LARGEST_TRAVEL
         out, far = (largest > np.where(turning, *pair) for pair in zip(angle, travel, strict=True))
+        end, bound = largest, None
         limit = f"{angle[0]:.3g} rad, {travel[0]:g} m (no limits.q in the robot file)"
-    text = case.reaching(largest, case.units, out)
     if not out.any():
-        return Answer("good", text, "", limit)
+        return Answer("good", case.reaching(largest, case.units, out), "", limit)
+    text = case.reaching(end, case.units, out, bound)
     turns, units = largest[turning], case.column_units.get("q", ())
     if (
         (out & turning).any()
@@ -127,7 +130,7 @@ def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, f
         limit = f"{sane['rad'][0]:g} rad/{unit}, {sane['m'][0]:g} m/{unit}"
     state: State = "no" if far.any() else "doubtful" if out.any() else "good"
     units = [f"{one}/{unit}" for one in case.units]
-    return Answer(state, case.reaching(values, units, out), limit=limit)
+    return Answer(state, case.reaching(values, units, out, limits), limit=limit)
 
 
 @Question(
@@ -203,8 +206,8 @@ def torques(case: Case) -> Answer:
 def lengths(case: Case) -> Answer | None:
     """Check whether the links of the robot file are as long as those of an arm.
 
-    Lengths are distances between frames, computed in the positions of the record. None if these are
-    not known.
+    Lengths are distances between frames, computed in the positions of the record. The result is
+    None if these positions are not known.
     """
     P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
     if P is None or not P.shape[1]:
@@ -231,8 +234,8 @@ def lengths(case: Case) -> Answer | None:
 def inertias(case: Case) -> Answer | None:
     """Check whether real bodies can have the masses and inertias of the robot file.
 
-    The pseudo-inertia of every link must be positive semidefinite. None if the file gives no
-    values.
+    The pseudo-inertia of every link must be positive semidefinite. The result is None if the file
+    gives no values.
     """
     if case.physical is None or not case.physical.values:
         return None
@@ -247,8 +250,8 @@ def inertias(case: Case) -> Answer | None:
 def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
     """Yield a sentence for each link whose values put its mass too far from its frame.
 
-    Too far is more than LIMIT.LINK_EXTENT times the reach of the robot (`length`, m). Values of the
-    link that the file does not give count as zero.
+    The limit is a multiple (LINK_EXTENT in limits.toml) of the reach of the robot (`length`, m).
+    Values of the link that the file does not give count as zero.
     """
     for j in physical.links:
         given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}

@@ -1,9 +1,9 @@
-"""Try the possible errors of `runtime.plausible.causes`: which one explains the record best?
+"""Try the possible errors of `runtime.plausible.causes`: which error explains the record best?
 
 A cause is a possible error of the study, tried as a change that corrects it. Every cause is first
-fitted by weighted least squares: no physical robot can have a better score. Only causes whose bound
-is better than the best score so far are fitted under the conditions of a physical robot, near the
-values of the robot file if there are any.
+fitted by weighted least squares: this score is a bound, because no physical robot can have a better
+score. Only causes whose bound is better than the best score so far are fitted under the conditions
+of a physical robot, near the values of the robot file if there are any.
 
 An unknown number xi of a cause, for instance a factor, is searched if its first step gains enough.
 Around the fit chi of a physical robot, with A the weighted normal matrix, B the stiffness of bodies
@@ -68,10 +68,11 @@ class Trial:
     ----------
     cause : Cause
     fit : Fit or None
-        Fit under the conditions of a physical robot; None if it was not made because a simpler one
-        shows that it cannot win.
+        Fit under the conditions of a physical robot; None if the fit was not made because a simpler
+        fit shows that the cause cannot win.
     gain : float, nats
-        Score of the study as given minus that of this fit, less a price for some causes.
+        Score of the study as given minus the score of this fit; for some causes, a penalty is
+        subtracted.
     equivalent : bool
         Whether no fit can distinguish the cause from the study as given.
     """
@@ -120,8 +121,8 @@ class Baseline:
     def regressor(self, cause: Cause) -> Array | None:
         """Evaluate the regressor with one possible error (cause) corrected.
 
-        Its columns are the standard parameters if the table of frames changes. Its shape is (K, n,
-        b); None if it cannot be evaluated.
+        If the table of frames changes, its columns are the standard parameters. The shape is (K, n,
+        b); None if the regressor cannot be evaluated.
         """
         if cause.on_torques:
             return self.D
@@ -138,7 +139,7 @@ class Baseline:
         On the side of the files, return the regressor F T^-1 W', the torques F tau - F T^-1 known,
         and the rows used, bool (K, n). Together they are T tau - known = W' X', multiplied by F
         T^-1. So every cause explains the same measured torques F tau, and residuals of coupled
-        motors are not mixed. None if the regressor cannot be evaluated.
+        motors are not mixed. The result is None if the regressor cannot be evaluated.
         """
         D = self.regressor(cause)
         if D is None:
@@ -177,7 +178,7 @@ class Baseline:
     def grams(self, cause: Cause) -> Grams | None:
         """Form the normal equations of least squares with one possible error (cause) corrected.
 
-        None if the regressor cannot be evaluated.
+        The result is None if the regressor cannot be evaluated.
         """
         rows = self.rows(cause)
         return None if rows is None else Grams.of(*rows, self.tau)
@@ -190,7 +191,7 @@ class Baseline:
     def bound(self, grams: Grams) -> Fit:
         """Fit without physical conditions; no physical fit of the same samples has a better score.
 
-        If the robot file has values of links, the parameters are drawn towards them.
+        If the robot file has values of links, the penalty draws the parameters towards them.
         """
         if self.bodies.near_values:
             return least_squares(self.standard(grams), self.N, self.bodies)
@@ -212,8 +213,8 @@ class Baseline:
         """Correct one possible error (cause), fit a physical robot, and compute how much the fit
         improves.
 
-        The gain is that of the score, in nats. The number of independent rows is the larger one of
-        the study and of the cause.
+        The gain is that of the score, in nats. The number of independent rows is the larger of two,
+        those of the study and of the cause.
 
         sigma : residuals of the joints that give the first weights; default: those of least
             squares.
@@ -230,7 +231,7 @@ class Baseline:
 
     def unseen(self, cause: Cause) -> float:
         """Correct one possible error, and compute how well a fit of half of the rows predicts the
-        others.
+        other half.
 
         The rows are divided into two parts, of alternating blocks of time. The fit of each part
         predicts the other part; the result is the score in nats, and smaller is better.
@@ -248,9 +249,11 @@ class Baseline:
         return score
 
     def held_out(self, cause: Cause) -> Array:
-        """Correct one possible error, and predict each half of the time by a fit of the other, %.
+        """Correct one possible error, and predict each half of the time by a fit of the other half,
+        %.
 
-        Returns the relative torque error of each joint, shape (n,); inf without a regressor.
+        Returns the relative torque error of each joint, shape (n,); inf if the regressor cannot be
+        evaluated.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -268,8 +271,8 @@ class Baseline:
         """Compute the largest share, of m given sets of torques, that no parameter values can
         explain.
 
-        For each of the m sets of torques, it is the norm of the part outside the span of W, over the
-        norm of the set.
+        For each of the m sets of torques, the share is the norm of the part outside the span of W,
+        divided by the norm of the set.
 
         V : m sets of torques on the side of the files, shape (K, n, m).
         """
@@ -281,9 +284,9 @@ class Baseline:
     def hides(self, cause: Cause) -> bool:
         """Whether the record fits equally well with and without correcting one possible error.
 
-        If so, the rows of the cause are in the span of W, and a physical robot explains both
-        equally well. The columns are tested in random combinations, together with the change of the
-        known torques.
+        If the fits are equal, the rows of the cause are in the span of W, and a physical robot
+        explains both equally well. The columns are tested in random combinations, together with the
+        change of the known torques.
         """
         rows = self.rows(cause)
         if rows is None:
@@ -306,7 +309,7 @@ class Baseline:
         """Four arrays of the linearised least-squares problem, in which an error of size xi is
         fitted.
 
-        They are W over the standard parameters, shape (K, n, p), the torques that W explains,
+        The arrays are W for the standard parameters, shape (K, n, p), the torques that W explains,
         shape (K, n), the residuals e divided by sigma, shape (K, n), and the matrix A + B.
         """
         D, Y, mask = self.as_given
@@ -320,7 +323,7 @@ class Baseline:
         """Compute the derivative of the torques with respect to the size xi of an error, shape (K,
         n).
 
-        The number is for instance a factor or a zero; J = d tau/d xi is a finite difference.
+        The size is for instance a factor or a zero position; J = d tau/d xi is a finite difference.
 
         change : makes the cause for a value of xi.
         """
@@ -343,8 +346,8 @@ class Baseline:
 
         J : effects of a numbers, shape (a, K, n).
 
-        Return xi, shape (a,), and its covariance. None if the samples do not determine any of the
-        numbers beside the parameters.
+        Return xi, shape (a,), and its covariance. Return None if the samples determine none of the
+        numbers in addition to the parameters.
         """
         W, _, e, H = self.normal
         mask = self.as_given[2]
@@ -458,7 +461,8 @@ def try_causes(
 ) -> list[Trial]:
     """Try every possible error of the study (cause), and return the fits, the best first.
 
-    The gain of kinds in DEAR is lowered by LIMIT.RATE_GAIN.
+    Some kinds of causes are improbable, so that their gain is lowered (by RATE_GAIN in
+    limits.toml).
     """
     model, variants, samples = baseline.model, baseline.variants, baseline.samples
     robot = Robot(model, variants, sides, samples, slow_friction(baseline), column_units)
@@ -541,11 +545,11 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
 
 
 def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
-    """Search the size xi of one possible error, such as a torque factor, that fits the record best.
+    """Search for the size xi of one possible error, such as a torque factor, that fits the record best.
 
-    None if no size improves the fit enough. A few sizes are tried with the joint weights of the
-    study, then a bounded search uses the weights of each trial. Each unknown number of the error
-    reduces the gain by log(N)/2 for N independent samples.
+    Return None if no size improves the fit enough. A few sizes are tried with the joint weights of
+    the study, then a bounded search uses the weights of each trial. Each unknown number of the
+    error reduces the gain by log(N)/2 for N independent samples.
     """
     scores: dict[float, float] = {}
     sigma = baseline.given.sigma
@@ -582,7 +586,8 @@ def _search_number(baseline: Baseline, row: Row, change: Change, first: float) -
 def slow_friction(baseline: Baseline) -> Array | None:
     """Estimate for each joint the friction at low speed that the model lacks, N m or N.
 
-    It is zero for joints in which it is uncertain, and None if this is so for all joints.
+    The friction is zero for joints in which it is uncertain; the result is None if it is uncertain
+    in all joints.
     """
     samples = baseline.samples
     size = np.sqrt((samples.tau**2).mean(axis=0))
@@ -604,13 +609,14 @@ def decisive(
 ) -> list[Trial]:
     """Select the corrections that explain the record decisively better than the study as given.
 
-    They must also predict better the rows that were not fitted, and lower the error of a joint in a
-    half of the record that was not fitted, unless they only bring the bodies nearer to the values.
-    The best trial is first, then those with a similar gain.
+    A selected correction must also improve the prediction of rows that were not fitted, and lower
+    the error of a joint in a half of the record that was not fitted, unless it only brings the
+    bodies nearer to the values. The best trial is first; trials with a similar gain follow.
 
     floor : error of a joint, %, that noise of the positions alone may cause. A smaller error is no
-        evidence for a cause. Nor is the distance from the robot file's values, if the floor is
-        above LIMIT.NOISY or if the error of a joint grows by a good part.
+        evidence for a cause. The distance from the robot file's values is no evidence either, if
+        the floor is high (above NOISY in limits.toml) or if the error of a joint grows
+        considerably.
     other : baseline of the validation records, which a cause must explain better, too.
     alone : baseline without the values of the robot file. A cause must reduce an error there, too,
         if its bodies differ from those of the file, for instance because a unit makes torques
@@ -670,9 +676,11 @@ def clearly_smaller(before: Array, after: Array) -> Array:
 
 
 def falls(baseline: Baseline, trial: Trial, alone: Baseline | None) -> bool:
-    """Whether a correction clearly lowers the error of a joint in a half that it was not fitted to.
+    """Whether a correction clearly lowers the error of a joint in a half of the record that was not
+    fitted.
 
-    Bodies that differ from those of the file must do so without its values (`alone`).
+    If the bodies differ from those of the file, the fits without the values of the file (`alone`)
+    must show this.
     """
     assert trial.fit is not None
     judge = alone if alone is not None and leaves_values(trial.fit, baseline) else baseline
@@ -685,8 +693,8 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
     """Whether the fitted links need far larger or smaller torques than links with the file's
     values.
 
-    The ratio of the torques is then outside LIMIT.CAD_RATIOS. False if the file does not give every
-    body.
+    The ratio of the torques is then outside CAD_RATIOS (limits.toml). The answer is False if the
+    file does not give every body.
     """
     bodies, physical = baseline.bodies, baseline.physical
     if not bodies.near_values or not bodies.known_links.all():
@@ -720,8 +728,8 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
 def loads(baseline: Baseline) -> list[Trial]:
     """Fit the records with free inertial parameters of the last link, which may carry a load.
 
-    The ten parameters of this link cost half of log N each. The list is empty if the file does not
-    give them.
+    Each of the ten parameters of this link costs (log N)/2. The list is empty if the file does not
+    give these parameters.
     """
     if not baseline.bodies.known_links[-1:].any():
         return []

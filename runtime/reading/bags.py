@@ -4,7 +4,7 @@ The library is rosbags (pip install symgen[bags]). The messages sensor_msgs/Join
 give the columns:
 
     t                        s from the first message that is read
-    shoulder.position        of the joint `shoulder`; so velocity and effort
+    shoulder.position        of the joint `shoulder`; also .velocity and .effort
 
 `runtime.reading.joint_states` makes the columns of the messages.
 
@@ -67,8 +67,8 @@ def read_bag(path: Path, options: Options) -> JointTable:
 def digest_of(path: Path) -> str:
     """Compute the SHA-256 of a ROS bag, which may be a file or a folder.
 
-    For a folder, it is that of the list of the hashes and names of its files, which must be inside
-    the folder.
+    For a folder, the result is the hash of the list of the hashes and names of its files, which
+    must be inside the folder.
     """
     if not path.is_dir():
         return sha256_of(path)
@@ -105,7 +105,8 @@ def stored_files(folder: Path) -> list[Path]:
 
 
 def _inside(folder: Path, name: str, where: str) -> Path:
-    """Return the path of the file `name` of a ROS 2 bag; InputError if it is outside the folder.
+    """Return the path of the file `name` of a ROS 2 bag; raise InputError if it is outside the
+    folder.
 
     Bags of the first ROS 2 versions write the name of the folder before the name of the file.
     """
@@ -200,7 +201,7 @@ def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
 
 
 def _sender(connection: Any, frame: str, *, several: bool) -> str:
-    """Write what a bag says of the publisher of a message: its node or channel, and its frame_id."""
+    """Write the data of a bag on the publisher of a message: its node or channel, and its frame_id."""
     node = getattr(connection.ext, "callerid", None)
     if not node and several:
         node = f"channel {connection.id}"

@@ -35,7 +35,7 @@ def column_names(
     joints: Sequence[str] = (),
     motors: Sequence[bool] = (),
 ) -> Columns:
-    """Find the names of the columns of a record: those in the settings, or else default names.
+    """Find the names of the columns of a record: the names in the settings, or else default names.
 
     Default names are t or time, q1 ... qn, tau1 ... taun; in a bag, the joints of its messages.
 
@@ -44,8 +44,8 @@ def column_names(
     first, last : Table
         Files of the positions and of the torques.
     joints : sequence of str
-        Names of the joints of the robot, in its order. They are used for `names` in the settings,
-        and for a bag without names in the settings.
+        Names of the joints of the robot, in its order. The names are used for `names` in the
+        settings, and for a bag without names in the settings.
     motors : sequence of bool
         Whether each joint of the robot has a motor; empty: all joints have a motor.
     """
@@ -102,7 +102,8 @@ def _require_seconds(table: Table, name: str) -> None:
 
 
 def _of_motors(names: tuple[str, ...], motors: Sequence[bool]) -> tuple[str, ...]:
-    """Insert NONE (no column) into the list of torque columns for each joint without a motor.
+    """Insert the mark for "no column" into the list of torque columns, for each joint without a
+    motor.
 
     names : columns of all joints, or of the joints with a motor only. Other names are returned
     unchanged.
@@ -152,7 +153,7 @@ def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, 
 def _numbered_joints(table: Table) -> tuple[str, ...]:
     """Return the names of the joints of a bag, sorted by the number in each name.
 
-    The names must differ in a number only, 1, 2 ... or 0, 1 ...; otherwise InputError.
+    The names must differ in a number only, 1, 2 ... or 0, 1 ...; otherwise an InputError is raised.
     """
     joints = table.joints or ()
     matches = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
@@ -369,7 +370,7 @@ def _position_units(settings: RecordSettings, n: int) -> tuple[Array, Array]:
 
 
 def _command(settings: RecordSettings, n: int) -> str:
-    """Return the unit A or V of all torque columns; InputError if they have several units."""
+    """Return the unit A or V of all torque columns; raise InputError if they have several units."""
     units = {torque_unit(name)[0] for name in _units(settings.units.tau, n, "units.tau")}
     if len(units) > 1 or settings.columns.tau_known:
         raise InputError(
@@ -385,8 +386,8 @@ def _torque_constant(
 ) -> tuple[Array, Array | None]:
     """Return the factors from the units of tau to SI, shape (n,), and the torque constants.
 
-    The torque constant is 1 for a joint whose unit is one of torque or force. If this is so for all
-    joints, None replaces the constants.
+    The torque constant is 1 for a joint whose unit is a unit of torque or force. If all joints have
+    such units, None replaces the constants.
     """
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]

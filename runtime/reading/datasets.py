@@ -153,7 +153,8 @@ def dataset_study(name: str) -> dict[str, Any]:
 
 
 def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
-    """Return the path of a file of a public dataset on this machine; None if it is not here.
+    """Return the path of a file of a public dataset on this machine; None if this machine does not
+    have it.
 
     The hash of the file is checked.
     """
@@ -162,9 +163,10 @@ def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
 
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
-    """Return the path of a file of a dataset: found on this machine, or downloaded from its source.
+    """Return the path of a file of a dataset: a file on this machine, or else a download from its
+    source.
 
-    Raise DataUnavailableError if the file is at none of these places.
+    Raise DataUnavailableError if neither is possible.
     """
     path, tried = _local(name, file, cache)
     if path is not None:
@@ -192,7 +194,7 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
 
 
 def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[str]]:
-    """Search a file of a dataset on this machine; return its path or None, and failed attempts."""
+    """Search for a file of a dataset on this machine; return its path or None, and failed attempts."""
     expected = _digest(name, file)
     tried: list[str] = []
     data = os.environ.get("SYMGEN_DATA")

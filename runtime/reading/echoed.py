@@ -60,7 +60,7 @@ def read_echo(file: str, lines: Iterator[tuple[int, str]]) -> JointTable:
 
 
 def _message(number: int, line: str) -> JointState | None:
-    """Read a line as a message; None if it is none."""
+    """Read a line as a message; return None if the line is no message."""
     fields = [field.strip() for field in line.split(",")]
     if len(fields) < FIRST + len(QUANTITIES):
         return None

@@ -94,7 +94,9 @@ def sha256(data: bytes) -> str:
 
 
 def _parts(path: Path) -> Iterator[bytes]:
-    """Yield the uncompressed bytes of a file, part by part; InputError if they exceed the limit."""
+    """Yield the uncompressed bytes of a file, part by part; raise InputError if they exceed the
+    limit.
+    """
     size = require_file(path)
     total = 0
     with opened(path) as stream:

@@ -1,7 +1,8 @@
 """Reading of HDF5 files (.h5, .hdf5), by h5py (pip install symgen[tables]).
 
 A data set in groups has the name observations.qpos. Vectors and matrices of numbers are read;
-images and other arrays of more dimensions are not. A file that MATLAB wrote is read as such.
+images and other arrays of more dimensions are not. A file that MATLAB wrote is read by
+`runtime.reading.mat`.
 
 Groups that differ by a number, such as data/demo_0, data/demo_1 ... of robomimic, are episodes: their
 data sets, one after the other, are the columns data.demo.obs.joint_pos, and each episode is a record of
@@ -70,7 +71,9 @@ class EpisodeTable(Table):
     joined: frozenset[str]
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """Return a table of the named columns, with the starts of the episodes if it has all."""
+        """Return a table of the named columns, with the starts of the episodes if the columns are
+        those of all episodes.
+        """
         own = {name: self.single[name] for name in names if name in self.single}
         starts = self.starts if self.joined.intersection(names) else ()
         return Table(
@@ -118,9 +121,11 @@ def _by_episodes(table: Table) -> Table:
 
 
 def _lengths(table: Table, names: Sequence[Mapping[str, str]], stem: str) -> list[int]:
-    """Return the numbers of samples of groups that are episodes; an empty list if they are none.
+    """Return the numbers of samples of groups that are episodes, or an empty list if the groups are
+    no episodes.
 
-    Groups of the same length are episodes only if their name says so: they may be joints.
+    Groups of the same length are episodes only if their name says so, because the groups may be
+    joints.
     """
     if len(names) < 2 or len({frozenset(one) for one in names}) > 1:
         return []

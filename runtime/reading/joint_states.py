@@ -1,7 +1,7 @@
 """Columns of the messages sensor_msgs/JointState of ROS, of a bag or of the text of `ros2 topic echo`.
 
     t                        s from the first message that is read
-    shoulder.position        of the joint `shoulder`; so velocity and effort
+    shoulder.position        of the joint `shoulder`; also .velocity and .effort
 
 In `record.columns` the name of the joint is enough: q means position, tau effort. Each message
 names its joints, so that their order may change from message to message. If several nodes publish
@@ -12,7 +12,7 @@ joints, their messages are joined by their stamps:
     the same stamps          the values of both
     others                   straight lines, to the stamps of the messages with most of the joints
 
-and this is told. Otherwise a message with only some of the requested joints is an error.
+and a note reports it. Otherwise a message with only some of the requested joints is an error.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class JointState:
     sender: str = ""
 
     def value(self, joint: str, quantity: str) -> float:
-        """Return one value of a joint, nan if the message does not have exactly one."""
+        """Return one value of a joint, or nan if the message does not have exactly one value."""
         values = getattr(self, quantity)
         if self.joints.count(joint) != 1 or len(values) != len(self.joints):
             return np.nan
@@ -121,7 +121,7 @@ class JointTable(Table):
         )
 
     def _sent(self, messages: Sequence[JointState], names: Sequence[str]) -> Sent:
-        """Return what the messages tell of their publishers, with the columns `names`."""
+        """Collect the data of the messages on their publishers, with the columns `names`."""
         pairs = [name.rpartition(".")[::2] for name in dict.fromkeys(names)]
         asked = [(joint, word) for joint, word in pairs if joint and word in QUANTITIES]
         values = [message.value(*pair) for message in messages for pair in asked]
@@ -179,8 +179,9 @@ def joined(
 ) -> tuple[list[JointState], str]:
     """Join the messages of several publishers, each with joints of its own, by their stamps.
 
-    parts : messages by their joints. Returns messages with all joints, at the stamps of the messages
-    with most joints, and a sentence. InputError if the messages do not overlap in time.
+    parts : messages by their joints. Returns messages with all joints, at the stamps of the
+      messages with most joints, and a sentence. Raise InputError if the messages do not overlap in
+      time.
     """
     own, base = max(parts.items(), key=lambda part: (len(part[0]), len(part[1])))
     order, stamps = sorted(own), _stamps(base)
@@ -233,9 +234,9 @@ def joined(
 def _by_joints(
     messages: Sequence[JointState], joints: set[str]
 ) -> dict[frozenset[str], Sequence[JointState]]:
-    """Group messages by those of the requested joints that they contain, if no message has all.
+    """Group messages by the requested joints that they contain, if no message has all joints.
 
-    One group of all messages, if some message has all joints, or if groups share a joint.
+    All messages are one group if some message has all joints, or if groups share a joint.
     """
     groups: dict[frozenset[str], list[JointState]] = {}
     for message in messages:

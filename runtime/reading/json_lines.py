@@ -2,7 +2,8 @@
 
     {"stamp": 0.005, "state": {"pos": [0.1, 0.2]}, "effort": [1.0, 2.0]}
 
-An object in an object has the name state.pos; a list of k numbers in every line is an array (N, k).
+An object in an object has the name state.pos; a list of k numbers in every line is an array (N, k),
+and so are the numbers of a list of objects: [{"q": 0.1}, {"q": 0.2}] of motors is motors.q.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ def read_json_lines(path: Path, options: Options) -> Table:
         try:
             sample = json.loads(line)
         except (ValueError, RecursionError) as e:
-            raise InputError(f"no JSON ({e}); {EXPECTED}"[:300], file=path.name, row=row) from None
+            raise InputError(
+                f"the line is not JSON ({e}); {EXPECTED}"[:300], file=path.name, row=row
+            ) from None
         if not isinstance(sample, dict):
             raise InputError(f"{str(line)[:40]!r}; {EXPECTED}", file=path.name, row=row)
         samples.append(dict(_flat("", sample)))
@@ -80,10 +83,17 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _flat(prefix: str, sample: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield names and values of an object, and of the objects in it as name.key."""
+    """Yield names and values of an object, and of the objects in it as name.key.
+
+    The values of objects in a list, which have the same keys, are a list.
+    """
     for key, value in sample.items():
         if isinstance(value, Mapping):
             yield from _flat(f"{prefix}{key}.", value)
+        elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+            objects = [dict(_flat(f"{prefix}{key}.", one)) for one in value]
+            for name in objects[0]:
+                yield name, [one.get(name) for one in objects]
         else:
             yield f"{prefix}{key}", value
 

@@ -25,7 +25,7 @@ def delays_of(delay: float | tuple[float, ...] | None, n: int) -> Array | None:
 
 
 def inside(t: Array, delay: Array, key: str = "record.delay") -> slice:
-    """Select the samples of which every torque was recorded; InputError if none is left.
+    """Select the samples of which every torque was recorded; raise InputError if none is left.
 
     key : name of the delay in the study.
     """

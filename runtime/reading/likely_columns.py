@@ -8,8 +8,8 @@
 
 `runtime.reading.words` gives the meaning of the words in a name, by language. A unit in a name
 decides what its column is: shoulder_load_Nm is a torque. A family is a group of columns with the
-same stem. A family with a word for "measured" is preferred to one without such a word, and this
-one to a family of commanded values, which is taken only if there is no other.
+same stem. A family with a word for "measured" is preferred to one without such a word, and the
+latter is preferred to a family of commanded values, which is used only if there is no other.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Family:
     ----------
     quantity : "t", "q", "tau", "qd", "other" or ""
     word : int
-        Place of the word in the names among the words of the quantity in `WORDS`.
+        Position of the word that the names contain in the list of words of the quantity.
     target : int
         0 measured, 1 without such a word, 2 commanded.
     names : tuple of str
@@ -74,16 +74,16 @@ class Family:
 
     @property
     def order(self) -> tuple[int, int, int, int, str]:
-        """Sort key: the columns with the smallest key are the likeliest ones of their quantity.
+        """Sort key: the columns with the smallest key are the likeliest columns of their quantity.
 
-        Preferred are, in this order, measured columns, a better word, more columns, and a shorter
+        The key prefers, in this order, measured columns, a better word, more columns, and a shorter
         stem.
         """
         return self.target, self.word, -len(self.names), len(self.stem), self.stem
 
     @property
     def is_current(self) -> bool:
-        """Whether the word of this family is one of current."""
+        """Whether the word of this family means a current."""
         return self.quantity == "tau" and _word("tau", self.word) in CURRENTS
 
 
@@ -129,9 +129,10 @@ def known_columns(names: Names, joints: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def joint_counts(names: Names, joints: Sequence[str] = ()) -> dict[str, int]:
-    """Count the joints of which names show positions ("q") and torques ("tau"); 0 if none do.
+    """Count the joints whose positions ("q") and torques ("tau") are recognised by column names; 0
+    if there are none.
 
-    Commanded columns do not count beside measured ones.
+    Commanded columns do not count if there are measured columns.
     """
     families = [*families_of(names, joints)]
     counts = {}
@@ -198,7 +199,7 @@ def _parent(family: Family) -> str:
 
 
 def _runs(t: Array) -> bool:
-    """Whether the values of a column increase, as those of a time do; True if they are unknown."""
+    """Whether the values of a column increase, as time stamps do; True if the values are unknown."""
     t = np.asarray(t, dtype=float).reshape(-1)
     step = np.diff(t[np.isfinite(t)])
     return not len(step) or bool(np.sum(step > 0) > np.sum(step < 0))
@@ -286,7 +287,7 @@ def _family(
 
 
 def _of_any_unit(stems: Mapping[str, Mapping[str, int]]) -> dict[str, dict[str, int]]:
-    """Join the families whose stems differ in the unit alone, if they are of different joints."""
+    """Join the families whose stems differ in the unit alone, if they belong to different joints."""
     bare: dict[str, list[str]] = {}
     for stem in stems:
         bare.setdefault(_without_unit(stem), []).append(stem)
@@ -323,8 +324,8 @@ def _aliases(joints: Sequence[str]) -> list[list[str]]:
 def _quantity(name: str, stem: str = "") -> tuple[str, int]:
     """Find the quantity that the words of a column name mean, for instance "tau".
 
-    Also return the place of the word in `WORDS`. The unit decides between positions, speeds and
-    torques. Return ("", 0) if the name means no quantity.
+    Also return the position of the word in the list of words of the quantity. The unit decides
+    between positions, speeds and torques. Return ("", 0) if the name means no quantity.
     """
     words = words_of(stem or name)
     meanings: dict[str, int] = {}
@@ -348,7 +349,9 @@ def _quantity(name: str, stem: str = "") -> tuple[str, int]:
 
 
 def _word(quantity: str, place: int) -> str:
-    """Return the word at a place of `WORDS`; "" where a unit shows the quantity."""
+    """Return the word at a position in the list of words of a quantity; "" if a unit, not a word,
+    shows the quantity.
+    """
     words = WORDS.get(quantity, ())
     return words[place] if place < len(words) else ""
 

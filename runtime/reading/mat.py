@@ -95,7 +95,7 @@ def _flatten(
 ) -> None:
     """Collect the numeric arrays of a MATLAB file, also those in structures, for instance rec.pos.
 
-    They are added to `arrays`. Members that cannot be read are described in `others`. read :
+    The arrays are added to `arrays`. Members that cannot be read are described in `others`. read :
     function that returns the value of a member.
     """
     for key, member in members.items():

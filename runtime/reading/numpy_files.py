@@ -69,7 +69,7 @@ def archive_of(path: Path) -> dict[str, Array]:
 
 
 def _plain(arrays: Any, name: str) -> Array:
-    """Return one array of a .npz archive; ValueError for pickled objects and damaged data."""
+    """Return one array of a .npz archive; raise ValueError for pickled objects and damaged data."""
     try:
         return np.asarray(arrays[name])
     except ValueError as e:

@@ -73,7 +73,8 @@ def read_parquet(path: Path, options: Options) -> Table:
 
 
 def _labels(path: Path) -> dict[str, list[str]]:
-    """Names of the numbers in each list of a LeRobot dataset, by column; {} without INFO.
+    """Names of the numbers in each list of a LeRobot dataset, by column; {} if the dataset has no
+    meta/info.json.
 
     The names are a list, or a mapping with one list: {motors: [...]}.
     """

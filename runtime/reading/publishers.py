@@ -1,16 +1,16 @@
 """Find the messages of a second publisher among those of a ROS topic.
 
 Several nodes may publish on one topic, for instance the driver of an arm and a node that repeats
-its positions without efforts. A record must contain the messages of one publisher: between those of
-two, efforts would be interpolated from one to the other. Publishers are told apart
+its positions without efforts. A record must contain the messages of one publisher: between messages
+of two publishers, efforts would be interpolated from one to the other. Publishers are distinguished
 
     by their names        the node in a ROS 1 bag, the channel of an MCAP file, the frame_id and the
                           counter seq of the header
     by their efforts      missing, or all zero in single messages between others that are not zero
     by their stamps       two regular trains of stamps, whose values do not continue each other
 
-A publisher without efforts is left out and named. If two publishers have values, or if it is not
-certain which messages are of the second one, the record is refused.
+A publisher without efforts is left out and named. If two publishers have values, or if it is
+uncertain which messages the second publisher sent, the record is refused.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ LARGEST_STEP = 100  # of the counter of a publisher: messages that were lost in 
 
 @dataclass(frozen=True, eq=False)
 class Sent:
-    """The messages of a topic, as far as they tell their publishers.
+    """The data of the messages of a topic that may show their publishers.
 
     Attributes
     ----------
     topic, file : str
         Names for messages to the user.
     senders : tuple of str
-        What the bag says of the publisher of each of N messages.
+        Name of the publisher of each of N messages, as the bag gives it.
     stamps : ndarray of int, shape (N,), ns
     values : ndarray, shape (N, c)
         The columns of the record; nan where a message has no value.
@@ -76,7 +76,7 @@ class Sent:
 def of_one_publisher(sent: Sent) -> tuple[Array, str]:
     """Select the messages of one publisher; return a mask, shape (N,), and a sentence on the others.
 
-    Raise InputError if messages of two publishers have values, or cannot be told apart.
+    Raise InputError if messages of two publishers have values, or cannot be distinguished.
     """
     kept, notes = np.ones(len(sent.stamps), dtype=bool), []
     for rule in (_by_names, _by_efforts, _by_stamps):
@@ -89,8 +89,8 @@ def of_one_publisher(sent: Sent) -> tuple[Array, str]:
 def counted_senders(counters: Sequence[int]) -> list[str]:
     """Name publishers by the counter in the header of their messages, which each of them increases.
 
-    A counter that neither is constant nor belongs to publishers that count one by one tells
-    nothing: every name is then "".
+    A counter that is not constant and does not rise by one for each publisher gives no information:
+    every name is then "".
     """
     last: list[int] = []  # by publisher
     steps: list[list[int]] = []
@@ -148,7 +148,9 @@ def _by_names(sent: Sent) -> tuple[Array, str]:
 
 
 def _alternate(masks: Sequence[Array]) -> bool:
-    """Whether the messages of two publishers lie between each other, not one after the other."""
+    """Whether the messages of two publishers alternate, instead of following each other in two
+    blocks.
+    """
     ends = [np.flatnonzero(mask)[[0, -1]] for mask in masks]
     return any(a[0] < b[1] and b[0] < a[1] for a, b in combinations(ends, 2))
 
@@ -245,9 +247,10 @@ def _regular(t: Array) -> bool:
 
 
 def _train(t: Array) -> Array | None:
-    """Find a regular train of stamps that begins with one of the first; None if there is none.
+    """Find a regular train of stamps that begins with one of the first stamps; None if there is no
+    train.
 
-    Of several, the one with most stamps is returned: numbers of its messages.
+    Return the numbers of its messages; among several trains, the longest is returned.
     """
     best = None
     for a, b in combinations(range(min(6, len(t))), 2):
@@ -272,7 +275,7 @@ def _train(t: Array) -> Array | None:
 def _continue(t: Array, x: Array, first: Array, others: Array) -> bool:
     """Whether the values at the messages `others` lie between those of the train `first`.
 
-    Stamps that are rounded, or late by a constant time, are no difference: the part of the
+    Rounded stamps, or stamps late by a constant time, do not count as a difference: the part of the
     difference that is a delay is subtracted.
     """
     at = t[first]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -113,11 +113,13 @@ def _pieces(
         )
     drives = None if model is None else drives_of(model)
     side = conversion(settings, drives, first, last, n)
-    samples = in_frames(_joint_side(settings, columns, signals, side, missing), places)
-    table = signals["q"].table
+    table = replace(signals["q"].table, columns={})
     command = side.command if "tau" in signals else ""
     notes = [signal.table.note for signal in signals.values() if signal.table.note]
-    del signals, tables, first, last, other
+    signals = {key: replace(x, table=replace(x.table, columns={})) for key, x in signals.items()}
+    del tables, first, last, other  # the columns of the files
+    samples = in_frames(_joint_side(settings, columns, signals, side, missing), places)
+    del signals
     law = None
     if settings.by_law:
         limits = dict(getattr(model, "LIMITS", {}))
@@ -184,7 +186,7 @@ def _without_delay(
 ) -> tuple[Stretch, dict[str, Array]]:
     """Shift late signals of one record to the instants of the positions.
 
-    delays : those of the columns of each late signal, s.   key : their name in the study.
+    delays : delays of the columns of each late signal, s. key : name of the delays in the study.
     """
     kept = inside(stretch.t, np.concatenate([*delays.values()]), key)
     late = {
@@ -218,7 +220,7 @@ class Signal:
     values: Array
 
     def finite(self, values: Array, hint: str = "", largest: float | None = None) -> Array:
-        """Return the values if all are finite and at most `largest`; else raise InputError."""
+        """Return the values; raise InputError unless all are finite and at most `largest`."""
         limits = {} if largest is None else {"largest": largest}
         return require_finite(
             values, self.names, self.table.file, self.table.row, hint=hint, **limits
@@ -253,7 +255,7 @@ def _signals(
     signals = {}
     for key, (place, names) in asked.items():
         positions = key == "q"
-        hint = f", or repair or cut the record; {COUNTS}" if positions else ""
+        hint = f"; repair or cut the record{f'; {COUNTS}' if positions else ''}"
         values = chosen[place].read(names, empty=missing and positions, hint=hint)
         signals[key] = Signal(chosen[place], names, values)
     return signals
@@ -295,16 +297,18 @@ def _require_shapes(
 def _joint_side(
     settings: RecordSettings,
     columns: Columns,
-    signals: Mapping[str, Signal],
+    signals: dict[str, Signal],
     side: Conversion,
     missing: bool,
 ) -> dict[str, Array]:
     """Convert the signals to the joint side of the gears and to SI units.
 
-    The result also has the entry `missing`, True for each missing position, if there are any.
+    The result also has the entry `missing`, True for each missing position, if there are any. Each
+    signal is removed from `signals` once it is converted, so that its memory is free.
     """
     samples: dict[str, Array] = {}
-    for key, signal in signals.items():
+    for key in tuple(signals):
+        signal = signals.pop(key)
         values = signal.values
         if key == "q" and missing and np.isnan(values).any():
             samples["missing"] = np.isnan(values)
@@ -335,7 +339,7 @@ def _joint_side(
 
 
 def _columns_of_joints(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the column names without the mark NONE of joints that have no column."""
+    """Return the column names, without the marks of the joints that have no column."""
     return tuple(name for name in names if name != NONE)
 
 
@@ -424,8 +428,8 @@ def _by_episodes(
 def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
     """Find the tables that contain the positions, the torques, and the known torques of a record.
 
-    The second of two files holds the torques, unless it alone has the known torques and the first
-    file has the torques.
+    The second of two files holds the torques, unless the second file has only the known torques and
+    the first file has the torques.
     """
     first = tables[0]
     last = tables[-1]
@@ -476,10 +480,10 @@ class Label:
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:
     """Give each record, and each file of the records, a unique name for results.
 
-    A record has the name in its settings, else that of its dataset, else that of its first file
-    without ending. Equal names are preceded by the folder (day1/run, day2/run), by more folders if
-    needed, and finally followed by a number. A file has its own name, or its path if another file
-    has the same name.
+    A record has the name in its settings, else the name of its dataset, else the name of its first
+    file without ending. Equal names are preceded by the folder (day1/run, day2/run), by more
+    folders if needed, and finally followed by a number. A file has its own name, or its path if
+    another file has the same name.
     """
     paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
     parts = [[*path.parts[:-1], stem(path.name)] for path in paths]

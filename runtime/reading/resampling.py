@@ -10,9 +10,9 @@ Boor, A Practical Guide to Splines, 2001, II.(12) and V.(18)), except near the e
 Nothing is filtered: a rate below that of the record would cause aliasing, and is refused.
 
 If the samples are uniform but their stamps are not (a controller samples, another computer adds the
-stamps), interpolation at the stamps would add an error to the positions, the jitter times the
-velocity. The method "count" uses the samples of a stretch as they are, t_k = t_first + k / rate,
-and checks their number against the duration of the stamps.
+stamps), interpolation at the stamps would add an error to the positions, equal to the jitter times
+the velocity. The method "count" uses the samples of a stretch as they are, t_k = t_first + k /
+rate, and checks their number against the duration of the stamps.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Settings of measured records: their files, their columns, and treatment of their time stamps.
 
-They are a part of a Study, and what reading of files adds to the sections of the chapter: units of
+The settings are a part of a Study. For the sections of the chapter, the module adds units of
 speeds, and records that are predicted.
 """
 
@@ -83,33 +83,35 @@ class Columns(Settings):
     q : tuple of str
         Positions.
     tau : tuple of str
-        Torques. 0 in place of a name: this joint has no motor, its torque is zero.
+        Torques. The number 0 in place of a name means that this joint has no motor, so that its
+        torque is zero.
     q_ref : tuple of str
         Reference positions, if the file of the positions holds them; unit and side are those of q.
     qr : tuple of str
         Earlier name of q_ref.
     qd : tuple of str
-        Velocities that were recorded with the positions, in the same file; unit and side of q,
-        per s. They replace differences of q in the rows where they are more accurate.
+        Velocities that were recorded with the positions, in the same file; unit and side of q, per
+        s. Velocities replace differences of q at the frequencies at which they are more accurate.
     qd_ref : tuple of str
-        Reference velocities, in the same file, units as qd; for the law of a controller.
+        Reference velocities, in the same file and unit as qd, for the law of a controller.
     tau_ff : tuple of str
         Feed-forward torques that the controller added, in the file of the torques; unit and side
-        are those of tau. For methods that simulate the controller, and for the torque of a law.
+        are those of tau. Methods that simulate the controller need them, and the torque of a law.
     tau_known : tuple of str
         Torques of the drives that do not come from the model (a counterbalance, a cable), computed
-        elsewhere; N m or N, joint side. They are subtracted from tau. 0 in place of a name: none on
-        this joint.
+        elsewhere; N m or N, joint side. Known torques are subtracted from tau. The number 0 in
+        place of a name means that this joint has none.
     channels : mapping of str to str
         Column of each channel.NAME in the laws of the robot file, without conversion, in the file of
         the positions: {temperature: T_motor}.
     wrench : mapping of int or str to six str
         Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
         number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
-        below the robot, {7: [...]} ahead of link 7. In addition to tau, or in place of tau. Of a
-        robot whose base moves or is free: the force and the moment by which the world acts on the
-        link of the frame, which may be the name of a link or site of the robot file, {foot: [...]},
-        in its axes about its origin; none: nothing acts, it flies.
+        below the robot, {7: [...]} ahead of link 7. A wrench may be given in addition to tau, or in
+        place of tau. For a robot whose base moves or is free, it is the force and the moment by
+        which the world acts on the link of the frame, in the axes of the frame about its origin. A
+        name of a link or site of the robot file may then replace the number, {foot: [...]}. "none"
+        means that nothing acts: the robot flies.
     """
 
     t: Text | None = None
@@ -136,7 +138,7 @@ class Columns(Settings):
         """Columns of signals that belong to no joint: channels (temperature ...) and sensor
         wrenches.
 
-        They are listed by name of the channel or wrench.
+        The columns are listed by the name of the channel or wrench.
         """
         own = {name: (column,) for name, column in self.channels.items()}
         wrench = {} if isinstance(self.wrench, str) else self.wrench
@@ -175,8 +177,9 @@ class Mounting(Settings):
 class BaseColumns(Settings):
     """Columns of the motion of a base that moves, in the file of the positions, SI.
 
-    One of three forms: the nine signals; the pose of frame 0 in the world, in whose axes the robot
-    file gives gravity; or a gyroscope and an accelerometer. The filters are those of the joints.
+    The motion has one of three forms: nine signals; the pose of frame 0 in the world, in whose axes
+    the robot file gives gravity; or a gyroscope and an accelerometer. The filters are those of the
+    joints.
 
     Attributes
     ----------
@@ -269,7 +272,7 @@ class BaseColumns(Settings):
     def of_sensor(self, values: Array) -> Array:
         """Convert readings of gyroscope and accelerometer, (N, 6), to w0, f and r, (N, 9).
 
-        These are SI, in the axes of frame 0; r is the place of the sensor.
+        The results are in SI, in the axes of frame 0; r is the place of the sensor.
         """
         w, f = np.hsplit(values, 2)
         w = np.deg2rad(w) if self.gyroscope_unit == "deg/s" else w
@@ -315,7 +318,8 @@ class Scale(Settings):
     q : float or tuple of float or str
         Factor on the positions.
     tau : float or tuple of float or str
-        Factor on the torques; gtau if the file holds force = gtau*vir.
+        Factor on the torques; for instance gtau, if the file contains the scalar gtau with force =
+        gtau*vir.
     wrench : float
         Factor on wrenches. A wrench acts from the sensor on the links ahead of it; set -1 if the
         sensor reports the opposite wrench, of the links on the sensor.
@@ -334,13 +338,13 @@ class Resample(Settings):
     rate : float or None, Hz
         New sampling rate; default: record.rate, else the mean rate of the record.
     method : str
-        cubic or linear interpolate between the stamps; count uses the samples as they are, for a
+        cubic and linear interpolate between the stamps; count uses the samples as they are, for a
         logger whose stamps jitter while the controller samples uniformly.
     gaps : str
-        refuse a record with gaps or with time that goes back, or split it at these places into
-        separate records.
+        Treatment of a record with gaps or with time that goes back: refuse, or split it at these
+        places into separate records.
     longest : float, sampling periods
-        Steps up to this length are bridged, longer ones are gaps.
+        Steps up to this length are bridged; longer steps are gaps.
     shortest : float, s
         Pieces shorter than this are left out.
     """
@@ -353,24 +357,27 @@ class Resample(Settings):
 
 
 class RecordSettings(Settings):
-    """Settings of one measured record, or of several alike: their files, columns and units.
+    """Settings of one measured record, or of several records with equal settings: their files,
+    columns and units.
 
     Attributes
     ----------
     files : tuple of str
-        One file with all columns, or two: positions (and time), then torques; a third file may hold
-        the known torques. Relative to the study file, or files of `dataset`.
+        One file with all columns, or two files: positions (and time), then torques; a third file
+        may contain the known torques. The names are relative to the study file, or name files of
+        `dataset`.
     columns : Columns
         Names of the columns.
     base : BaseColumns
         Columns of the motion of the base, for a robot whose base moves.
     side : str
-        motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
-        torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
-        dry friction of drives (Ia, FV, FS) are left out of the columns, and of the base parameters
-        that contain Ia.
+        Place of measurement. motor: qm = R (q - offset) and tau = R' u, by the drives of the robot.
+        joint: positions and torques at the joints. link: joint torques of sensors behind the gears,
+        which contain nothing of the drives; inertia, viscous and dry friction of drives (Ia, FV,
+        FS) are then left out of the columns, and Ia of the base parameters.
     torque_side : str or None
-        The side of tau alone: motor for joint angles recorded with motor currents. Default: side.
+        The side of tau if it differs from that of q: motor for joint angles recorded with motor
+        currents. Default: side.
     rate : float or None, Hz
         Sampling rate; may be left out if a time column gives it.
     units : Units
@@ -380,13 +387,15 @@ class RecordSettings(Settings):
     counts_per_revolution : float or tuple of float or None
         Counts in one turn of the encoder, on the side of q; needed if the unit of q is counts.
     torque_constant : float or tuple of float or "none" or None, N*m/A or N*m/V
-        For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
-        or with the gear in it for the joint. "none": the constants are unknown; the model is fitted
-        in A or V, and all values are in this unit.
+        Torque per unit of tau in A, mA or V, on the side of tau: that of the motor, or for the
+        joint with the gear included. Default: the constants of the robot's drives. "none": the
+        constants are unknown; the model is fitted in A or V, and all values are in this unit.
     coupling : str
-        Use the off-diagonal part of R for both, for position or torque alone, or for none.
+        Quantities for which the off-diagonal elements of the matrix R of gear ratios are used:
+        both, position, torque or none.
     delay : float or tuple of float, s
-        Time by which the torques are late against the positions; they are read so much later.
+        Time by which the torques are late relative to the positions; torques are read later by this
+        time.
     jitter : float, sampling periods
         Largest difference of the time column from a uniform grid.
     dataset : str or None
@@ -396,14 +405,14 @@ class RecordSettings(Settings):
     simulated : bool
         Whether the record was simulated, not measured; results then say so.
     topic : str or None
-        Topic of a bag that holds several of sensor_msgs/JointState.
+        Topic of a bag with several topics of the type sensor_msgs/JointState.
     decimal : str
         Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or
         blanks).
     unwrap : bool
         Whether angles that jump back after a full turn of the side on which they were recorded (180
-        to -180 degrees) are made continuous, from the first sample on. The turn of the first sample
-        has to suit the zero of the joint.
+        to -180 degrees) are made continuous, from the first sample on. The first sample has to be
+        in the right turn.
     resample : Resample or None
         Conversion of a time column that is not uniform; null: such a column is refused.
     controller : Controller or None
@@ -500,7 +509,7 @@ def with_law(
 def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...]:
     """Return one RecordSettings per record: the files in `also` become separate records.
 
-    These further records have no name.
+    The further records have no name.
     """
     return tuple(
         single
@@ -553,8 +562,9 @@ class Rows(chapter.Rows):
     ----------
     low_speed : float or tuple of float or str, rad/s or m/s
         Rows of joint j with |qd_j| below this speed are left out, because sign(qd) is noise in
-        them. A text may have another unit: 2 rpm. auto: found from the record for joints with dry
-        friction in the model whose torques at rest are not those of the model; zero for others.
+        them. A text may have another unit: 2 rpm. auto: the speed is found from the record for
+        joints with dry friction in the model whose torques at rest differ from the model, and is
+        zero for other joints.
     """
 
     _with_unit = field_validator("low_speed", mode="before")(speed)

@@ -23,7 +23,7 @@ class Options:
     Attributes
     ----------
     topic : str or None
-        Topic of a bag; None: the only one with sensor_msgs/JointState.
+        Topic of a bag; None: the only topic of the type sensor_msgs/JointState.
     decimal : str
         Decimal sign of a text file, "." or ",".
     """
@@ -57,6 +57,8 @@ class Table:
         Sentence that a user of these columns should read.
     has_header : bool
         Whether the names are the first line of a text.
+    numbered : bool
+        Whether a column may also be called by its number, from 1, if no column has this name.
     what : str
         Kind of the file, in messages.
     digest : str
@@ -74,6 +76,7 @@ class Table:
     topic: str = ""
     note: str = ""
     has_header: bool = False
+    numbered: bool = False
     what: str = "the file"
     digest: str = ""
     starts: tuple[int, ...] = ()
@@ -89,6 +92,7 @@ class Table:
         The time may be filled in such rows, which come from another source. For most files, the
         table is returned unchanged.
         """
+        names = self._called(names)
         gaps = [name for name in dict.fromkeys(names) if name in self.empty]
         if not gaps or len({*names}) - len(gaps) > 1:
             return self
@@ -120,6 +124,7 @@ class Table:
         hint : str
             Remedy for an empty field, in the message.
         """
+        names = self._called(names)
         for name in names:
             if name in self.refused:
                 raise self.refused[name]
@@ -147,6 +152,11 @@ class Table:
             )
         return columns[0] if len(columns) == 1 else np.hstack(columns)
 
+    def _called(self, names: Sequence[str]) -> list[str]:
+        """Replace the numbers of columns among `names` by the names of these columns."""
+        numbers = {str(k): name for k, name in enumerate(self.names, 1)} if self.numbered else {}
+        return [name if name in self.columns else numbers.get(name, name) for name in names]
+
     def scalar(self, name: str) -> float:
         """Return the single number called `name`; raise InputError if there is none."""
         if name in self.refused:
@@ -166,7 +176,7 @@ class Table:
         return float(x.reshape(()))
 
     def _by_samples(self, name: str) -> Array:
-        """Return the array `name`, shape (N, k); InputError if it does not have N samples."""
+        """Return the array `name`, shape (N, k); raise InputError if it does not have N samples."""
         x = self.columns[name]
         problem = ""
         if x.ndim > 2:
@@ -191,7 +201,7 @@ def is_numeric(x: Array) -> bool:
 def damage_named(title: str, file: str) -> Iterator[None]:
     """Turn errors of a file-reading library into InputError, for the duration of the block.
 
-    title : what the file should be, for the message.
+    title : kind of file that is expected, for the message.
     """
     try:
         yield

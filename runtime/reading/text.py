@@ -1,10 +1,12 @@
 """Reading of text files with columns of numbers.
 
-Columns are separated by commas, semicolons, tabs or blanks. There is one header line or none, and
-`#` starts a comment. Decimals have a point, or a comma if the settings say so. The text is UTF-8, or
-UTF-16 if it starts with the bytes ff fe or fe ff.
+Columns are separated by commas, semicolons, tabs or blanks; a field in quotation marks may contain
+the separator. There is one header line or none. `#`, or `%` before a blank, starts a comment, and a
+comment just above the numbers with one name for each column is the header, as numpy.savetxt writes
+it. A first line such as `sep=;` is left out. Decimals have a point, or a comma if the settings say
+so. The text is UTF-8, or UTF-16 if it starts with the bytes ff fe or fe ff.
 
-The text of `ros2 topic echo --csv` is told by its first line (`runtime.reading.echoed`).
+The text of `ros2 topic echo --csv` is recognised by its first line (`runtime.reading.echoed`).
 
 NumPy parses a file whose fields are all numbers. Other files are read field by field: a column with
 other texts raises an error only if it is used, with the first line of such a text.
@@ -12,13 +14,14 @@ other texts raises an error only if it is used, with the first line of such a te
 
 from __future__ import annotations
 
+import csv
 import re
 from array import array
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
 from functools import partial
 from io import TextIOWrapper
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +32,8 @@ from runtime.reading.files import opened
 from runtime.reading.table import WIDEST, Array, Options, Table
 
 CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
+COMMENT = re.compile(r"#|%+(\s|$)")
+SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)  # first line of a file of Excel
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 SIGNATURES = {  # first bytes of files that are no text
     b"\x89PNG": "a picture (PNG), not a table",
@@ -39,6 +44,7 @@ SIGNATURES = {  # first bytes of files that are no text
     b"\xd0\xcf\x11\xe0": "an Excel workbook; save the sheet as CSV UTF-8",
     b"\x89HDF": "an HDF5 file; give its name the ending .hdf5",
     b"PAR1": "a Parquet file; give its name the ending .parquet",
+    b"\0\0\0\0": "a file of zeros, as after a crash; write the file again",
     b"SQLite format 3": "a database, perhaps a bag of ROS 2; give its name the ending .db3",
 }
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of a text in UTF-16
@@ -64,7 +70,9 @@ def read_text(path: Path, options: Options) -> Table:
         )
     header = _fields(first, delimiter)
     has_header = any(_number(field, decimal) is None for field in header)
-    names = tuple(header) if has_header else tuple(str(k + 1) for k in range(len(header)))
+    names = tuple(header)
+    if not has_header:
+        names = _names_above(path, delimiter, decimal, len(header))
     double = sorted(name for name, count in Counter(names).items() if count > 1)
     if double:
         raise InputError(
@@ -79,7 +87,8 @@ def read_text(path: Path, options: Options) -> Table:
         values = _by_fields(file, lines, names, delimiter, decimal, refused, empty)
     if not len(values):
         raise InputError(
-            f"the file has no line of numbers under the header {', '.join(names)}", file=file
+            f"the file has no line of numbers under the header {', '.join(names)[:200]}",
+            file=file,
         )
     return Table(
         file=file,
@@ -88,12 +97,31 @@ def read_text(path: Path, options: Options) -> Table:
         empty=empty,
         row=partial(_row, path, has_header),
         has_header=has_header,
+        numbered=True,
         what="a text file",
     )
 
 
 def _lines(path: Path) -> Lines:
     """Yield the lines of a text file that are neither empty nor comments, with their numbers."""
+    for number, line in _with_comments(path):
+        if not (COMMENT.match(line) or (number == 1 and SEPARATOR.fullmatch(line))):
+            yield number, line
+
+
+def _names_above(path: Path, delimiter: str | None, decimal: str, width: int) -> tuple[str, ...]:
+    """Read the names of columns from the comment just above the numbers; without them 1, 2, 3 ..."""
+    comments = takewhile(lambda one: COMMENT.match(one[1]), _with_comments(path))
+    last = deque((line for _, line in comments), maxlen=1)
+    names = tuple(_fields(last[0].lstrip("#% \t"), delimiter)) if last else ()
+    words = all(name and _number(name, decimal) is None for name in names)
+    if words and len(names) == len({*names}) == width:
+        return names
+    return tuple(str(k + 1) for k in range(width))
+
+
+def _with_comments(path: Path) -> Lines:
+    """Yield the lines of a text file that are not empty, with their numbers."""
     number = 0
     try:
         encoding = _encoding(path)
@@ -101,14 +129,14 @@ def _lines(path: Path) -> Lines:
             while block := text.read(BLOCK) + text.readline():
                 lines = enumerate(block.removesuffix("\n").split("\n"), number + 1)
                 for number, line in lines:
-                    if line and (line := line.strip()) and line[0] != "#":
+                    if line and (line := line.strip()):
                         yield number, line
     except UnicodeDecodeError:
         raise _not_utf8(path) from None
 
 
 def _encoding(path: Path) -> str:
-    """Return the encoding of a text file: UTF-16 if it starts so, else UTF-8.
+    """Return the encoding of a text file: UTF-16 if its first bytes say so, else UTF-8.
 
     Raise InputError for a file whose first bytes are those of another kind of file.
     """
@@ -218,11 +246,15 @@ def _by_fields(
 
 def _width(line: str, delimiter: str | None) -> int:
     """Count the fields of a line of a text file."""
-    return len(line.split()) if delimiter is None else line.count(delimiter) + 1
+    return len(_fields(line, delimiter)) if '"' in line else len(line.split(delimiter))
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
-    return [field.strip().strip('"').strip() for field in line.split(delimiter)]
+    """Split a line into its fields; one in quotation marks may contain the delimiter."""
+    fields = line.split(delimiter)
+    if '"' in line and delimiter is not None:
+        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    return [field.strip().strip('"').strip() for field in fields]
 
 
 def _number(text: str, decimal: str) -> float | None:

@@ -178,7 +178,7 @@ def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
 def _of_pint(text: str) -> Unit:
     """Find the kind and the SI factor of a unit that is not in the table, by the library pint.
 
-    Return ("", nan) if pint does not have the unit, or if its kind is none of those in SI.
+    Return ("", nan) if pint does not have the unit, or if the unit is of another kind.
     """
     nothing = ("", float("nan"))
     if len(text) > LONGEST or not GRAMMAR.fullmatch(text):

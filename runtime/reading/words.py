@@ -55,7 +55,7 @@ def plain(text: str) -> str:
 
 
 def _column(place: int) -> tuple[str, ...]:
-    """Words of one column of `LANGUAGES`, of all languages, each once."""
+    """Words of all languages for one kind of quantity, each once."""
     return tuple(
         dict.fromkeys(
             plain(word).lower()
@@ -133,9 +133,10 @@ READ = {"t": time_unit, "q": position_unit, "tau": torque_unit, "qd": speed_unit
 
 @cache
 def stated_unit(name: str, quantity: str, written: bool = False) -> str:
-    """Find the unit of a quantity that a name states, in brackets or as a word; "" if none.
+    """Find the unit of a quantity that a name states, in brackets or as a word; "" if there is
+    none.
 
-    written : whether to return the text of the unit as it is in the name.
+    written : whether to return the unit as it is written in the name.
     """
     read = READ.get(quantity)
     if read is None:

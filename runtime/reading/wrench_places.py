@@ -1,7 +1,8 @@
 """Wrenches that a study gives at named places of a robot, in the frames of the links that hold them.
 
-A place on link j, such as a link or a site of the user's file, has the pose R, P in frame j. A force
-F and a moment N in its axes about its origin are, in the axes of frame j about the origin of it,
+A place on link j, such as a link or a site of the user's file, has the pose R, P in frame j. A
+force F and a moment N in the axes of the place about its origin become, in the axes of frame j
+about the origin of frame j,
 
     R F   and   R N + P x R F .
 """
@@ -28,8 +29,8 @@ def wrench_places(columns: Columns, model: Any) -> dict[str, tuple[int, Any]]:
     Raises
     ------
     SettingsError
-        A name that the robot lacks, or a name with a model that knows no places or whose base is
-        fixed, where a wrench is that of a sensor before a whole link.
+        The robot lacks a name, or the model knows no places, or its base is fixed, so that a wrench
+        has to be that of a sensor before a whole link.
     """
     wrench = {} if isinstance(columns.wrench, str) else columns.wrench
     names = [key for key in wrench if not str(key).isdecimal()]

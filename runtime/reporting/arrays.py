@@ -110,7 +110,7 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
     """Convert names to variable names that MATLAB accepts and that all differ.
 
-    A name has a letter first, then letters, digits and _, at most 63 characters; it is no keyword.
+    A name has a letter first, then letters, digits and _, at most 63 characters, and is no keyword.
     """
     allowed: list[str] = []
     for name in names:

@@ -1,8 +1,8 @@
 """Draw the figures of a report with matplotlib.
 
 Only this module and its users load matplotlib, through its object interface: no global state and no
-window. Equal data give equal bytes. The colours are those of Okabe and Ito, which differ for any
-colour vision. Line styles and widths differ too, so that a grey print can be read.
+window. Equal data give equal bytes. The colours are those of Okabe and Ito, which people with any
+colour vision can distinguish. Line styles and widths differ too, so that a grey print can be read.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def draw_figure(
 ) -> Image:
     """Convert a matplotlib figure into an Image, which a report page can show.
 
-    name : name of the files, PNG and SVG, that are written beside the page; "": no files.
+    name : name of the files, PNG and SVG, that are written next to the page; "": no files.
     """
     picture = svg(figure)
     return Image(

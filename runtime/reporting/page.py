@@ -5,8 +5,8 @@ The page requests nothing from other files or servers. Only this module of the p
 A Page has plain values; the template has the layout. All text from a file or a user is escaped, by
 the template or by `markup.element`; numbers for the script are JSON in which <, > and & are
 escapes. The content security policy allows only this script and this style sheet, by their hashes.
-Without scripts, and in print, figures are the images, and the rows of tables have their written
-order.
+Without scripts, and in print, the page shows the images, and the rows of tables in the order of the
+file.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Matrix:
     ----------
     caption : str
     names : sequence of str
-        Names of the rows, which are also those of the columns.
+        Names of the rows, which are also the names of the columns.
     values : sequence of sequences of float
     """
 
@@ -73,7 +73,7 @@ class Image:
     series : Series or None
         Data from which a script draws the figure instead of the image.
     files : mapping of str to bytes
-        The figure in every format that is written beside the page, by file name.
+        The figure in every format that is written next to the page, by file name.
     """
 
     caption: str

@@ -45,9 +45,9 @@ def identification_page(
     study : str
         Text of study.yaml.
     title, verdict : str
-        Replace the title and the verdict of the identification.
+        Texts that replace the title and the verdict of the identification.
     warning : str
-        Precedes the warning on simulated data.
+        Text that precedes the warning on simulated data.
     sections : sequence of Section
         Further sections, after the parameters.
     """
@@ -117,7 +117,7 @@ def checks_section(checklist: Checklist) -> Section:
     """Build the collapsible section of the checks: question, answer, limit, and remedy if there is
     one.
 
-    Checks that are not good have a table of their own, which is the first.
+    The first table has the checks that are not good, the second the others.
     """
     order = ("no", "doubtful", "open", "good")
     ordered = sorted(checklist.checks, key=lambda check: order.index(check.state))

@@ -132,7 +132,7 @@ def _half(fit: Any, name: str) -> float:
 
 
 def _difference(fit: Any, name: str, given: float) -> str:
-    """Write the difference of a fitted value from the robot file's value, in % of the robot file's.
+    """Write the difference of a fitted value from the robot file's value, in % of the latter.
 
     The text is empty if the value of the robot file is smaller than half the width of the 95 %
     interval.
@@ -160,8 +160,8 @@ def _made_of(name: str, formulas: Mapping[str, str]) -> str:
 def correlation_section(result: Identification) -> Section:
     """Build the section of correlated parameters: groups and pairs, and a table of correlations.
 
-    Groups and pairs are those of all parameters; the table has the most correlated of the used
-    ones.
+    Groups and pairs are those of all parameters; the table has the most correlated of the
+    parameters that are used.
     """
     correlations = result.correlations
     groups = "; ".join(", ".join(group) for group in correlations.groups) or "none"
@@ -184,7 +184,7 @@ def correlation_section(result: Identification) -> Section:
 def correlation_matrix(fit: Estimate) -> Matrix | None:
     """Select the most correlated parameters, and make a table of their correlations.
 
-    None for a single parameter, or if the estimate has no covariance.
+    The result is None for a single parameter, or if the estimate has no covariance.
     """
     deviation = np.sqrt(np.diag(fit.covariance))
     if len(fit.names) < 2 or not np.all(deviation > 0):

@@ -113,9 +113,10 @@ def write_all(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[P
 
 @contextmanager
 def results_in(folder: str | Path | None) -> Iterator[Any]:
-    """Yield a Results object for a folder, which is made if missing; None if no folder is given.
+    """Yield a Results object for a folder, which is made if missing; yield None if no folder is
+    given.
 
-    Raises OutputError if nothing can be written there.
+    Raises OutputError if nothing can be written into the folder.
     """
     if folder is None:
         yield None

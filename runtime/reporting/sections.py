@@ -55,7 +55,7 @@ def torque_section(result: Identification) -> Section:
 def other_torques_section(result: Identification) -> list[Section]:
     """Build the section with the torque figures of the joints that `torque_section` does not show.
 
-    The list is empty if all joints are shown there.
+    The list is empty if `torque_section` shows all joints.
     """
     shown = _joints_shown(result)
     others = [joint for joint in result.comparison if joint not in shown]
@@ -65,7 +65,7 @@ def other_torques_section(result: Identification) -> list[Section]:
 def _joints_shown(result: Identification) -> list[JointComparison]:
     """Select the joints whose torque figures come first on the page, in the order of the robot.
 
-    If there are many joints, these are the joints with the largest errors.
+    If there are many joints, those with the largest errors are selected.
     """
     joints = result.comparison
     if len(joints) <= FIGURES_SHOWN:
@@ -187,7 +187,8 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """Build the section on the parameters removed to find the essential ones, with F-tests.
+    """Build the section on the parameters that were removed to find the essential parameters, with
+    F-tests.
 
     The table lists each removed parameter, in order, with the ratio of sigma_rho after its removal.
     """

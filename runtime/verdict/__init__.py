@@ -1,1 +1,1 @@
-"""The verdict on an identification: its questions, asked of one result, and what the answers come to."""
+"""The verdict on an identification: its questions, and the overall result of their answers."""

@@ -1,9 +1,9 @@
 """Questions of the verdict on every identification: can its parameter values be used?
 
 Each question has an answer, a limit and a remedy; `runtime.compose` lists the questions. The limits
-are conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||.
-Standard deviations are the larger of the corrected one and the one of the block bootstrap
-(`runtime.core.uncertainty`); eq. (10) alone is used only if both are unknown.
+are conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||. The
+standard deviation of a parameter is the larger of two: the corrected deviation, and that of the
+block bootstrap (`runtime.core.uncertainty`); eq. (10) alone is used only if both are unknown.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def of_single_values(question: Callable[[Identification], Check | None]) -> Call
 def rank_and_condition(result: Identification) -> Answer:
     """Check the rank of the observation matrix W, and its condition number with columns of norm 1.
 
-    The rank is checked for all parameters and for the used ones, the condition number for the used
-    parameters only.
+    The rank is checked for all parameters and for the used parameters, the condition number for the
+    used parameters only.
     """
     fit = result.model_estimate
     for one in (result.estimate, fit):
@@ -121,10 +121,10 @@ def explained_by_joint(result: Identification) -> Answer | None:
 def predicted(result: Identification) -> Answer:
     """Check the relative error, %, of torques that the model predicts for data not fitted.
 
-    The answer is "open" if there are no such data. If they are one part of the record, predicted
-    with parameters from another part, which may not excite all parameters, the answer is good up to
-    the error that the deviations of these parameters explain (but not above the last limit), and
-    never "no".
+    The answer is "open" if there are no such data. If these data are one part of the record,
+    predicted with parameters from another part, the other part may not excite all parameters. The
+    answer is then never "no", and it is good up to the error that the deviations of these
+    parameters explain (but not above the last limit).
     """
     fit, error = result.model_estimate, result.prediction_error
     halves = bool(result.validation) and not result.by_records
@@ -184,7 +184,7 @@ def certain(result: Identification) -> Answer:
 
     A parameter whose 95 % interval contains zero has no percentage: it is certain if its deviation
     is small compared with the largest parameter of the same unit. The standard deviations do not
-    assume independent residuals; eq. (10) is used only if no other is known.
+    assume independent residuals; eq. (10) is used only if no other deviation is known.
     """
     fit, drawn = result.model_estimate, result.uncertainty.bootstrap
     essential = result.model_columns == "essential"
@@ -257,7 +257,7 @@ def determined(result: Identification) -> Check | None:
 
 @of_single_values
 def conditioned(result: Identification) -> Check | None:
-    """Ask it where the condition is bad: this is the least of several doubts."""
+    """Check the condition number of W; if several answers are doubtful, this doubt is named last."""
     check = rank_and_condition(result)
     return check if check.state == "doubtful" else None
 

@@ -1,4 +1,4 @@
-"""The verdict on an identification: every question is asked, and the worst answer decides."""
+"""The verdict on an identification: all questions are answered, and the worst answer decides."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def of_parts(about: About) -> Ask:
 def verdict(
     result: Identification, on_record: Sequence[Ask], on_parameters: Sequence[Ask]
 ) -> Checklist:
-    """Ask the questions on the record, then those on parameters that the record determines."""
+    """Ask the questions on the record, then the questions on parameters that the record determines."""
 
     def answers(questions: Sequence[Ask]) -> list[Check]:
         given = [ask(result) for ask in questions]

@@ -3,7 +3,8 @@
 `python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]]} as JSON. The
 argument null stands for the result. Its `size` numbers are all equal to `before` when the call
 begins, or are copied from the array of the library that `before` names. The program prints [status,
-numbers] of every call, the numbers as doubles in base64: those of large robots are millions.
+numbers] of every call, with the numbers as doubles in base64, because large robots have millions of
+them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Call functions of MATLAB files in Octave, which runs in a process of its own.
 
-The process stays for further calls, because its start takes half a second. It is started anew after
-a function that ended it or took too long. Numbers go through files of doubles: everything, texts
-too, is an array (number of axes, their lengths, its entries in the order of Fortran).
+The process stays for further calls, because its start takes half a second. A new process is started
+if a function ended it or took too long. All data go through files of doubles: every value,
+including a text, is an array (number of axes, their lengths, and the entries in the order of
+Fortran).
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ leaves no file octave-workspace if a signal ends it."""
 
 
 class Call(NamedTuple):
-    """A call of a function: its name, its arguments, and how many results are asked for."""
+    """A call of a function: its name, its arguments, and the number of requested results."""
 
     name: str
     arguments: Sequence[Array]
@@ -103,7 +104,9 @@ class OctaveError(Exception):
 
 
 def octave() -> str | None:
-    """Return the program of Octave, that of the environment variable OCTAVE first; None without one."""
+    """Return the path of Octave (the environment variable OCTAVE comes first), or None if there is
+    no Octave.
+    """
     return os.environ.get("OCTAVE") or next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 

@@ -9,11 +9,11 @@ The primes are drawn anew, so that no coefficient is checked over the prime that
 over F_p is never above the generic rank, so equality proves that no further relation exists.
 
 A false identity is a nonzero rational function of the geometry and of each state. Its degree is at
-most d (`degree`: every angle counts 2 per multiple, numerator and denominator together). Then it
-vanishes at a random geometry, or at every state of one, with probability at most 2 d/p (Schwartz
-1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is below SURE. Numbers in the robot file
-are not random: a false identity between numbers is a fixed nonzero number, which only its own few
-prime factors divide.
+most d (`degree`: every angle counts 2 per multiple, numerator and denominator together). By
+Schwartz and Zippel, it vanishes at a random geometry, or at every state of one geometry, with
+probability at most 2 d/p (Schwartz 1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is
+negligible (below `SURE`). Numbers in the robot file are not random: a false identity between
+numbers is a fixed nonzero number, which only its own few prime factors divide.
 
 General loops: the same identities are checked at random points of the closed mechanism
 (`regroup.states`), with the values of lengths that are numbers in the robot file. The rank is
@@ -39,7 +39,7 @@ import numpy as np
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
 from symgen.derive.closure import parts
-from symgen.derive.constants import kept_angle, numbered, roots_of, rows_of, units_of
+from symgen.derive.constants import numbered, roots_of, rows_of, symbolic_angle, units_of
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
@@ -395,7 +395,7 @@ def degree(regrouping: Regrouping) -> int:
     units = units_of(numbered(robot))
 
     def angle(e: Expression) -> int:
-        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(kept_angle(e))[1]))
+        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(symbolic_angle(e))[1]))
 
     def constant(e: Expression) -> int:
         return max((sum(abs(n) * atom(a) for a, n in m) for m in e.terms), default=0)
@@ -461,7 +461,7 @@ def _modulo(
 def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
     """List the columns of the regressor W (derived from energies) that contradict the formulas.
 
-    A column is listed if its error exceeds ROUNDED times the largest entry.
+    A column is listed if its error, relative to the largest entry, exceeds rounding (`ROUNDED`).
     """
     robot = regrouping.robot
     K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
@@ -483,10 +483,10 @@ def independent(robot: Robot) -> Sample:
 
 
 def rank_by_gap(W: Array) -> tuple[int, bool]:
-    """Compute the rank of a matrix by its singular values, and whether they tell it.
+    """Compute the rank of a matrix by its singular values, and whether this rank is certain.
 
-    They do if all are far from rounding, or if one exceeds the next by a factor of SEEN. Otherwise
-    the rank is a lower bound.
+    It is certain if all singular values are far above rounding errors, or if one exceeds the next
+    by a factor of 1000 (`SEEN`). Otherwise the rank is a lower bound.
     """
     rank, _ = numeric_rank(W)
     if rank == W.shape[1]:
@@ -504,7 +504,7 @@ def numeric_rank(W: Array, *, proved: int = 0) -> tuple[int, float]:
     of singular values.
 
     If `proved` is a larger rank that was proved exactly, it is the result, provided that its last
-    singular value exceeds the next by a factor of SEEN.
+    singular value exceeds the next by a factor of 1000 (`SEEN`).
     """
     norms = np.linalg.norm(W, axis=0)
     acts = norms > 0

@@ -1,6 +1,6 @@
 """The statements of a certificate as numbers and texts, which other programs can verify.
 
-`docs/examples/check_certificate.py` does this from the frame table, without the code of symgen.
+`docs/examples/check_certificate.py` verifies them from the frame table, without the code of symgen.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
 def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
     """Return the statements of a certificate as numbers and texts, which other programs can verify.
 
-    These are the robot, the relations of its joints, rank, primes, formulas, and for each emitted
-    file its hash and its check.
+    The statements are about the robot, the relations of its joints, rank, primes, formulas, and for
+    each emitted file its hash and its check.
 
     Expressions are texts in the grammar of robot files. The identities are those of the columns of
     all standard parameters, D_chi = sum_k coefficient_k,chi D_own,k, at random points over F_p.
@@ -64,7 +64,7 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
     """Describe a family of elements, such as friction or springs, by numbers and texts.
 
     For each row the sign of its first coefficient of an actuated joint is included, at the
-    constants of the robot file. It defines which direction of motion is positive.
+    constants of the robot file. This sign defines which direction of motion is positive.
     """
     closure = close(robot)
     active = {j: closure.in_independent(row) for j, row in e.along.items()}

@@ -2,9 +2,9 @@
 
 The folder of a file in the cache is named after the SHA-256 of the text without the lines of its
 certificate, so that an entry is never out of date. A file with another text is replaced as a whole:
-written under another name first. A second folder, named after the whole text, marks the text as
-certified. If the cache cannot be written, a folder is used that exists only as long as this
-process.
+the new file is written under another name first. A second folder, named after the whole text, marks
+the text as certified. If the cache cannot be written, a folder is used that exists only as long as
+this process.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ the end of a MATLAB text.
 def cache_folder() -> Path:
     """Return the cache folder in which emitted modules are stored.
 
-    It is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform. Symbolic links
-    are followed, so that the folder which is judged is the folder which is used. As the XDG
-    specification says, a relative XDG_CACHE_HOME is ignored.
+    The folder is SYMGEN_CACHE/modules, or else a folder in the cache folder of the platform.
+    Symbolic links are followed, so that the folder which is judged is the folder which is used. As
+    the XDG specification says, a relative XDG_CACHE_HOME is ignored.
     """
     if given := os.environ.get("SYMGEN_CACHE"):
         return (Path(given) / "modules").resolve()

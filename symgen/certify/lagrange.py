@@ -14,16 +14,16 @@ both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrang
     Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i
             = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0) dT_j/dq_i Sigma_j e4
 
-CasADi gives dT/dq and Tddot. A base that moves has six more coordinates: the pose T_0 of frame 0
-in the world. Where T_0 = 1, with the products of poses T_0 T_j differentiated,
+CasADi gives dT/dq and Tddot. A base that moves has six more coordinates: the pose T_0 of frame 0 in
+the world. At T_0 = 1, the second derivative of the products of poses T_0 T_j,
 
     Tddot = T_0dd T_j + 2 T_0d T_jd + T_jdd,   T_0d = | hat(w0)  0 |   T_0dd = | hat(wd0) + hat(w0)^2  a0 |
                                                       | 0        0 |           | 0                     0  |
 
-in place of T_jdd, with gravity in a0. The rows of a free base are Lagrange's equations of these
+replaces T_jdd, with gravity in a0. The rows of a free base are Lagrange's equations of these
 coordinates: the poses have the derivatives G_i T_j, with G_i = dT_0/dx_i for a shift x_i of frame 0
-along its axes, then for a turn about them, and link 0 has T_j = 1. An element with parameter c acts along a motion s = G q, or has a
-matrix B (B = G'G if it acts along s). It adds to Gamma
+along its axes, then for a turn about them, and link 0 has T_j = 1. An element with parameter c acts
+along a motion s = G q, or has a matrix B (B = G'G if it acts along s). It adds to Gamma
 
     c B qdd          inertia
     c G'             offset
@@ -270,7 +270,7 @@ class Lagrange:
         (friction, spring, ...) acts, and the matrix B of an element with parameter c: torque c B q
         of a spring, c B qd of viscous friction, c B qdd of an inertia.
 
-        B has shape (n, n). It is G'G if the element acts along a row G. j is the number in the name
+        B has shape (n, n). B is G'G if the element acts along a row G. j is the number in the name
         of the parameter c, for instance 2 for FV2.
         """
         moving = self.robot.moving
@@ -325,8 +325,8 @@ class Lagrange:
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
         """Return the linear and angular acceleration of a frame, in frame 0, shape (..., 6).
 
-        First the acceleration of its origin, then its angular acceleration wd from
-        hat(wd) = Rddot R' + Rdot Rdot'.
+        The first three rows are the acceleration of its origin, the others its angular acceleration
+        wd from hat(wd) = Rddot R' + Rdot Rdot'.
         """
         if frame == 0:
             return np.zeros((*np.shape(q)[:-1], 6))
@@ -453,7 +453,8 @@ class Lagrange:
 
 
 def _carried(T: Array, Td: Array, base: Array) -> Array:
-    """Return T_0dd T_j + 2 T_0d T_jd at T_0 = 1, shape (..., frames, 4, 4): what a base adds.
+    """Return T_0dd T_j + 2 T_0d T_jd at T_0 = 1, shape (..., frames, 4, 4): the accelerations that
+    a moving base adds.
 
     T, Td : poses of the frames j in frame 0, and their rates, shape (..., frames, 4, 4).
     base : w0, wd0 and a0, shape (..., 9).
@@ -466,7 +467,9 @@ def _carried(T: Array, Td: Array, base: Array) -> Array:
 
 
 def _with_link_0(of_frames: Array, own: Array) -> Array:
-    """Put the matrix `own` of link 0 before those of the frames, shape (..., 1 + frames, 4, 4)."""
+    """Put the matrix `own` of link 0 before the matrices of the frames, shape (..., 1 + frames, 4,
+    4).
+    """
     own = np.broadcast_to(own, (*of_frames.shape[:-3], 1, 4, 4))
     return np.concatenate([own, of_frames], axis=-3)
 
@@ -491,14 +494,14 @@ def _axial(W: Array) -> Array:
 
 
 class Moves(NamedTuple):
-    """The pairs of a joint i and a frame j that it moves: those in which dT_j/dq_i is not zero.
+    """The pairs of a joint i and a frame j that it moves, so that dT_j/dq_i is not zero.
 
     Attributes
     ----------
     joint, frame : ndarray, shape (pairs,)
         Index of the joint in `robot.moving`, and of the frame in `robot.frames`.
     entry : ndarray
-        Where the derivatives that CasADi computes stand in a table (pairs, 16) of columns.
+        Places of the derivatives that CasADi computes, in a table (pairs, 16) of columns.
     """
 
     joint: Array
@@ -521,8 +524,8 @@ def _functions(robot: Robot) -> tuple[dict[str, Any], Moves]:
     """Return the CasADi functions of a robot by name, such as the poses and their derivatives.
 
     Their arguments are q, qd, qdd of all moving joints, as far as needed, then the constants with
-    one more number at the end. Of the derivatives of the poses, only those that are not zero are
-    computed; `Moves` tells their places.
+    one more number at the end. Only derivatives of the poses that are not zero are computed;
+    `Moves` lists their places.
     """
     n, symbols = len(robot.moving), ca.SX.sym("c", len(robot.constants) + 1)
     constants = dict(zip(robot.constants, ca.vertsplit(symbols), strict=False))
@@ -662,7 +665,8 @@ def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
     """Return the largest factor of each actuated velocity in friction that acts on several joints.
 
     Friction along q4 + 101.25 q5, for instance, depends on the velocity q4d + 101.25 q5d: the
-    factor of joint 5 is 101.25. It is 1 for a joint without such friction. Shape (n,).
+    factor of joint 5 is 101.25. The factor is 1 for a joint without such friction. The result has
+    the shape (n,).
     """
     closure = close(robot)
     rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]
@@ -741,9 +745,10 @@ def sampled(
 def in_one_mode(robot: Robot) -> Robot:
     """Return the robot with constraints or start positions that fix the assembly mode of its loops.
 
-    If all passive joints are linear in the actuated ones, these relations become constraints of the
-    robot; else its loops get a start configuration that closes them. The dynamics by energies still
-    close every loop themselves, and refuse states in which the declared positions do not close it.
+    If all passive joints are linear in the actuated joints, these relations become constraints of
+    the robot; else its loops get a start configuration that closes them. The dynamics by energies
+    still close every loop themselves, and refuse states in which the declared positions do not
+    close it.
     """
     closure = close(robot)
     if closure.tied:

@@ -1,8 +1,10 @@
-"""Python modules of robots: from the cache if the same was asked before, or else derived.
+"""Python modules of robots: from the cache if the same module was requested before, or else
+derived.
 
 A folder of the cache is named after a request: the content of a robot, the options, and the source
-files of symgen. It contains the name of the text that answers the request, as an empty folder. So a
-module is found without a derivation, and is never that of another robot, option or version.
+files of symgen. The folder contains an empty folder, whose name is that of the text that answers
+the request. So a module is found without a derivation, and never belongs to another robot, option
+or version.
 """
 
 from __future__ import annotations
@@ -89,7 +91,8 @@ def module_of(robot: Robot, request: object, derived: Callable[[Robot], Path]) -
 
     The module gets the named places of the robot, MOUNTS (`symgen.description.mounts`).
 
-    `request` : what is asked for besides the robot, such as the options. The derivation warns of
+    `request` : the rest of the request besides the robot, such as the options. The derivation warns
+      of
     inertias that no body can have, so that a robot with such inertias is always derived.
     """
     module = _module_of(robot, request, derived)

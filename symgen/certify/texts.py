@@ -67,16 +67,16 @@ class TextCheck:
         Hash of the text without the lines of its certificate.
     errors : mapping
         Largest difference of each function from the independent values, relative to the largest
-        entry. It is infinite if the function fails, if its result has another shape, or if a call
-        without constants differs from a call with the constants of the robot file.
+        entry. The difference is infinite if the function fails, if its result has another shape, or
+        if a call without constants differs from a call with the constants of the robot file.
     constants : str
-        Which constants the functions were called with.
+        Name of the constants with which the functions were called.
     left_out : tuple of str
         Functions that have no meaning for this robot.
     uses : tuple of str
         The ways in which a Python module was run.
     not_run : str
-        Reason why nothing was run; empty if the file was run.
+        Reason why the file was not run; empty if it was run.
     raised : mapping
         Error message of each function of a Python module that failed.
     """
@@ -145,7 +145,7 @@ def text_check(
 ) -> TextCheck:
     """Run every function of a source file and compare the results with independent values.
 
-    The lines of a certificate in the text are removed first. `beside` are the texts of files whose
+    The lines of a certificate in the text are removed first. `beside` has the texts of files whose
     functions this file may call, by file name.
     """
     text = without_certificate(text)
@@ -182,8 +182,8 @@ def text_check(
 def with_certificate(text: str, check: TextCheck, formulas: str) -> str:
     """Add the certificate to a source text: in the docstring of a Python module, else in comments.
 
-    In a docstring the certificate stands at the end; comments stand before the text, in MATLAB
-    behind it, because its help is the first comment.
+    In a docstring the certificate stands at the end; comments stand before the text, but after it
+    in MATLAB, whose help is the first comment of a file.
     """
     said = f"{HEAD}{VERSION}: formulas {formulas}; {check.sentence}."
     if not text.startswith('"""'):
@@ -233,7 +233,7 @@ def module_errors(
                 if text:
                     raised[name] = f"{text} ({how})"
                 elif how == CASADI and not any(c.keywords for c in checks):
-                    _share(module, name)
+                    _share_graph(module, name)
         if not witness.tied:
             try:
                 errors[DERIVATIVES] = _derivative_error(module, witness)
@@ -264,8 +264,8 @@ def largest(
     """Compute the largest error of an emitted function over all its test calls.
 
     Return the error, and the message if the function failed. The error is infinite if the defaults
-    of the function are not the constants of the robot file. Stacked arrays come from the function
-    whose defaults the run on NumPy's arrays checks.
+    of the function are not the constants of the robot file. With stacked arrays, the defaults are
+    not checked again: the run on NumPy's arrays has checked them.
     """
     try:
         errors = [
@@ -325,8 +325,8 @@ def _stacked(module: ModuleType, name: str, check: Check, constants: Mapping[str
 def _is_of_casadi(name: str, check: Check) -> bool:
     """Whether a test call of an emitted function is also made by CasADi, not only with NumPy.
 
-    One state has no observation matrix, CasADi has no blocks of samples, and one text gives the
-    Jacobians of all frames: two frames and the default one are run.
+    One state has no observation matrix, and CasADi has no blocks of samples. One text gives the
+    Jacobians of all frames, so that only two frames and the default frame are run.
     """
     blocks = check.arguments[0].ndim > 1 and len(check.arguments[0]) > STATES
     return name != "observation_matrix" and not blocks and check.keywords.get("frame", 1) <= 2
@@ -368,11 +368,11 @@ def _restored(module: ModuleType) -> Iterator[None]:
         vars(module).update(own)
 
 
-def _share(module: ModuleType, name: str) -> None:
+def _share_graph(module: ModuleType, name: str) -> None:
     """Let a checked function of CasADi take the place of the module's function `name`.
 
-    Other functions that call `name`, as forward_dynamics calls inverse_dynamics, then share its
-    expression graph and do not run its text again.
+    Other functions that call `name` then share its expression graph and do not run its text again;
+    for instance, forward_dynamics calls inverse_dynamics.
     """
     function = _function(module, name)
 
@@ -427,7 +427,7 @@ def octave_check(
 ) -> TextCheck:
     """Run the function of a MATLAB file in Octave and compare its results with independent values.
 
-    The function may call those of the other `texts`.
+    The function may call the functions of the other `texts`.
     """
     name = file.removeprefix(f"{witness.robot.name}_").removesuffix(".m")
     if call_octave.octave() is None:
@@ -468,7 +468,7 @@ def _octave_error(
 
 
 def _outputs(name: str, check: Check) -> int:
-    """Return how many results a test call of a MATLAB function asks for."""
+    """Return the number of results that a test call requests from a MATLAB function."""
     return len(check.arguments) if name == PASSIVE else 1
 
 

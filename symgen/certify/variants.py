@@ -1,15 +1,15 @@
 """Python module of a robot whose frame table and gravity are constants that can be changed.
 
-It shows how the robot would behave with another angle, length or gravity, without another
+The module shows how the robot would behave with another angle, length or gravity, without another
 derivation.
 
     free = symgen.variants("arm.yaml")
     free.regressor(q, qd, qdd, free_alpha4=pi/2)       frame 4 turned the other way
     free.observation_matrix(q, qd, qdd, free_gx=9.81, free_gz=0.0)
 
-Its columns are all standard parameters, because the base parameters depend on the geometry.
-`runtime.identify` accepts it as `variants` and tests whether another frame table explains a record
-better.
+The columns of its regressor are those of all standard parameters, because the base parameters
+depend on the geometry. `runtime.identify` accepts it as `variants` and tests whether another frame
+table explains a record better.
 
 A robot with closed loops has a fixed frame table, because the loops must close; only gravity is
 free. Frames between joints that a constraint ties are fixed too, because the constraint holds for
@@ -49,7 +49,7 @@ def variants(robot: str | Path | Robot, *, base: str | None = None) -> ModuleTyp
     module
         The constants of the robot file, and free_alpha1, free_d1, free_theta1, free_r1 ... (gamma
         and b if a frame has them), free_gx, free_gy, free_gz. Their defaults are the values in the
-        robot file. No function reads gravity on a base that moves, whose a0 has it.
+        robot file. On a base that moves, no function reads gravity, because a0 contains it.
 
     Examples
     --------

@@ -4,10 +4,10 @@ The dynamics follow from energies, the poses from products of the matrices of th
 (`certify.lagrange`). Neither shares code with the recursions, the regrouping or the printers. The
 formulas give X from random standard parameters of real bodies, so that A is positive definite.
 
-Constants are drawn around their values in the robot file. They are drawn closer to these values if
-the loops do not close, or if a regrouping formula holds only for one sign of a ratio. The values of
-the robot file itself are used if this fails too, or if coefficients of formulas are numbers, which
-hold for these values alone.
+Constants are drawn around their values in the robot file. If the loops do not close, or if a
+regrouping formula holds only for one sign of a ratio, constants are drawn closer to these values.
+If this fails too, or if coefficients of formulas are numbers, which hold for these values alone,
+the values of the robot file itself are used.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ class Witness:
     ) -> Array:
         """Compute the torques Gamma of the actuated joints, shape (..., n).
 
-        `chi` are the standard parameters. Default: the ones of the witness. `turning` : whether a
-        base that moves has its w0 and wd0, besides its a0.
+        `chi` are the standard parameters. Default: the parameters of the witness. `turning` :
+        whether a base that moves has w0 and wd0 in addition to a0.
         """
         base = self.base
         if base is not None and not turning:
@@ -133,7 +133,8 @@ class Witness:
     def inertia(self) -> Array:
         """Compute the inertia matrix A from the energy, shape (N, n, n), or (N, 6 + n, 6 + n).
 
-        A free base has rows of force and moment, and columns of a unit of a0 and of wd0: torques.
+        For a free base, the first six rows are force and moment, and the first six columns are the
+        torques by a unit of a0 and of wd0.
         """
         A = self.G.swapaxes(1, 2) @ self.model.inertia_matrix(self.x, self.chi) @ self.G
         if not self.robot.base_is_free:
@@ -175,7 +176,7 @@ class Witness:
     def own(self) -> Array:
         """Regressor columns of the base parameters at the N test states, shape (N, n, b).
 
-        They are the columns of the standard parameters that give the base parameters their names.
+        The columns are those of the standard parameters that give the base parameters their names.
         """
         return self.D[:, :, [self.robot.parameters.index(name) for name in self.regrouping.own]]
 
@@ -304,7 +305,7 @@ class Witness:
     ) -> Array:
         """Compute the expected value of a model, such as the inertia matrix, shape (N, ...).
 
-        The model is that of frame `of`, with components in frame `frame`. A determinant uses the
+        The model describes frame `of`, with components in frame `frame`. A determinant uses the
         given rows of the Jacobian, counted from 1, or else all rows that are not zero.
         """
         N, chi, T, friction = len(self.q), self.chi, self.poses, lambda e: e.is_friction
@@ -490,7 +491,7 @@ def _at(robot: Robot, constants: Mapping[str, float]) -> Sample:
 def _sampled(regrouping: Regrouping, fixed: Mapping[str, float]) -> tuple[Sample, str]:
     """Draw random states and, if possible, random constants of the robot.
 
-    Return the states, and a text that names the constants: random, or the ones of the file.
+    Return the states, and a text that says whether the constants are random or those of the file.
     """
     robot, rng = regrouping.robot, np.random.default_rng(8)
     spreads = SPREADS[2 * bool(close(robot).tied) :]

@@ -21,9 +21,7 @@ def apply(
             help="File into which the values are written: .urdf, or MJCF as .xml or .mjcf."
         ),
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; MODEL stays as it is.")
-    ] = None,
+    output: Annotated[Path | None, options.output("File to write; MODEL stays as it is.")] = None,
     in_place: Annotated[
         bool, typer.Option("--in-place", help="Overwrite MODEL instead of writing another file.")
     ] = False,
@@ -89,8 +87,8 @@ def apply(
 
 
 def copied_loops(model: Path, output: Path | None, force: bool) -> dict[Path, bytes]:
-    """Return the file with the loops of `model`, at the place where `output` needs it, if it lacks
-    it.
+    """Return the file with the loops of `model`, at the place where `output` needs this file, if it
+    is missing there.
     """
     from symgen.description.files import loops_beside
 

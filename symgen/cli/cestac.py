@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def cestac(
@@ -59,7 +60,7 @@ def cestac(
     """Study how coarser encoders change the estimate. The exit code is 1 if the estimate is biased
     at one of the encoder or torque steps.
 
-    With --advise, exit code 1 if the estimate would be biased at one of the steps of --delta, or if
+    With --advise, the exit code is 1 if the estimate would be biased at one of the steps of --delta, or if
     the runs contradict the prediction. --advise tries both readers of encoders,
     positions and counts; --reader lowpass alone is six times faster.
 
@@ -92,8 +93,8 @@ def cestac(
             estimate={"method": method},
             signals={"reader": reader},
         )
-        described = session.corrected(described, study)
-        model = session.model_of(described, study=study)
+        described = corrected(described, study)
+        model = model_of(described, study=study)
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = records_of(study.record, model, study)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of, variants_of
 
 
 def compare(
@@ -29,7 +30,7 @@ def compare(
     """Identify ROBOT with the settings of each STUDY, and rank the studies by how well they predict
     the validation record.
 
-    Each study uses the set of parameters that predicts best. Exit code 1 if the best study cannot
+    Each study uses the set of parameters that predicts best. The exit code is 1 if the best study cannot
     be used.
     """
     with session.progress_lines(), session.results_in(output) as results:
@@ -39,15 +40,17 @@ def compare(
 
         described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         if len(study) < 2:
-            raise InputError(f"{study[0]}: one study; name two or more study files to compare")
+            raise InputError(
+                f"{study[0]}: only one study is given; name two or more study files to compare"
+            )
         short = len({Path(one).stem for one in study}) == len(study)
         candidates = {
             Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
         }
         first = next(iter(candidates.values()))
-        described = session.corrected(described, first)
-        model = session.model_of(described, study=first)
-        ranking = runtime.compare(model, candidates, variants=session.variants_of(described))
+        described = corrected(described, first)
+        model = model_of(described, study=first)
+        ranking = runtime.compare(model, candidates, variants=variants_of(described))
         if results is not None:
             runtime.report(ranking, results)
         checklist = ranking.best.checklist

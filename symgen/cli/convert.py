@@ -66,8 +66,8 @@ def convert(
     ] = None,
     force: options.Force = False,
 ) -> None:
-    """Convert the robot IN to the format of OUT. Report what was read differently from the text of
-    IN, and what OUT cannot store.
+    """Convert the robot IN to the format of OUT. Report values that were read
+    differently from the text of IN, and data that OUT cannot store.
 
     OUT is written whole or not at all. If it would describe another mechanism, nothing is written
     and the exit code is 2.

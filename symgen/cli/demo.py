@@ -20,8 +20,8 @@ def demo(
         ),
     ] = False,
 ) -> None:
-    """Identify the Stäubli TX40 from its public record, or from a simulated one if that cannot be
-    fetched, judge its encoder resolution, and compare the results with the published tables.
+    """Identify the Stäubli TX40 from its public record, or from a simulated record if the
+    public record cannot be fetched, judge the encoder resolution, and compare the results with the published tables.
     """
     with session.results_in(output) as results:
         from symgen.demo import demonstrate, prepare

@@ -18,6 +18,9 @@ def identify_each(
 ) -> bool:
     """Identify the parameters from each record of a study alone, and print a line for each record.
 
+    If a record cannot be used, its line gives the reason, and the other records are still
+    identified. Existing results are kept.
+
     options : as for `runtime.identify_each`.
 
     Returns

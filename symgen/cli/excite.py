@@ -1,4 +1,4 @@
-"""The command `symgen excite ROBOT [RECORD]`: search an exciting motion within the limits."""
+"""The command `symgen excite ROBOT [RECORD]`: search for an exciting motion within the limits."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def excite(
@@ -40,9 +41,9 @@ def excite(
         typer.Option(
             help="Criterion of the motion: cond minimises the condition number of the observation "
             "matrix W, logdet maximises the determinant of W'W, sigma minimises the largest "
-            "standard deviation of a parameter, in %. record compares the standard deviations of each "
-            "parameter, with the new motion and with RECORD, and minimises the largest ratio of "
-            "the new one to the other. Default: record if RECORD is given, else cond."
+            "standard deviation of a parameter, in %. record minimises the largest ratio of the standard "
+            "deviation of a parameter with the new motion to that with the motion of RECORD. "
+            "Default: record if RECORD is given, else cond."
         ),
     ] = None,
     columns: options.Columns = None,
@@ -56,10 +57,10 @@ def excite(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Search an exciting motion, from which the parameters of ROBOT can be identified well. Kind
+    """Search for an exciting motion, from which the parameters of ROBOT can be identified well. Kind
     and limits of the motion are settings of the section `excitation` of a study file.
 
-    With --poses, search poses at rest, which identify the parameters of gravity.
+    With --poses, search for poses at rest, which identify the parameters of gravity.
 
     Without RECORD, or with a study file that names none, the parameters are the values of the robot
     file.
@@ -82,7 +83,7 @@ def excite(
                 "seed": seed,
             },
         )
-        model = session.model_of(session.corrected(described, study))
+        model = model_of(corrected(described, study))
         records = records_of(study.record, model, study)
         with session.progress_bar("starts") as progress, processes(workers) as own_map:
             seek: Any = partial(runtime.excite, map=own_map, progress=progress)

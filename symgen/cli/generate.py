@@ -27,13 +27,13 @@ def generate(
         typer.Argument(
             metavar="ROBOT...",
             help=(
-                "Packaged robots or robot files (.yaml, .par, .urdf, .xml, .mjcf); `all` for every packaged one."
+                "Packaged robots or robot files (.yaml, .par, .urdf, .xml, .mjcf); `all` means every packaged robot."
             ),
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder into which the files are written.")
-    ] = Path("generated"),
+    output: Annotated[Path, options.output("Folder into which the files are written.")] = Path(
+        "generated"
+    ),
     target: Annotated[
         str,
         typer.Option(

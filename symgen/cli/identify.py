@@ -10,6 +10,7 @@ import typer
 
 from symgen.cli import mended, options, session
 from symgen.cli.each import identify_each
+from symgen.update.models import corrected, model_of, variants_of
 
 
 def identify(
@@ -61,14 +62,14 @@ def identify(
     repair: Annotated[
         Path | None,
         typer.Option(
-            help="Search several errors of the study at once, judge them on rows that were not used, and write the mended study; then identify with it. The given files stay as they are."
+            help="Search for several errors of the study at once, judge the corrections on rows that the search did not use, and write the mended study; then identify with it. The given files stay as they are."
         ),
     ] = None,
     each: Annotated[
         bool,
         typer.Option(
             "--each",
-            help="Identify from each record alone, not from all together; the results of each are in a folder of FOLDER, and are kept if the command is repeated.",
+            help="Identify from each record alone, not from all together. Each record gets its own folder of results in FOLDER; existing results are kept if the command is repeated.",
         ),
     ] = False,
     workers: options.Workers = 0,
@@ -92,13 +93,13 @@ def identify(
         described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         study = session.study_of_arguments(record)
         study = study if at is None else session.changed(study, payload={"at": at})
-        robot_file, described = described, session.corrected(described, study)
-        model = session.model_of(described, study=study)
+        robot_file, described = described, corrected(described, study)
+        model = model_of(described, study=study)
         if suggest is not None:
             study = session.suggested_study(study, model, suggest, robot, json=json)
         asked: dict[str, Any] = {"physical": physical, "friction": friction, "plausible": plausible}
         if each and output is not None:
-            variants = session.variants_of(described) if plausible else None
+            variants = variants_of(described) if plausible else None
             good = identify_each(model, study, output, workers, variants=variants, **asked)
             session.end(good=good)
             return
@@ -106,14 +107,14 @@ def identify(
         found = None
         if repair is not None:
             found, study = mended.mended_study(robot_file, study, records, repair)
-            described = session.corrected(robot_file, study)
-            model = session.model_of(described, study=study)
+            described = corrected(robot_file, study)
+            model = model_of(described, study=study)
             records = records_of(study.record, model, study)
         result = runtime.identify(
             model,
             records,
             study,
-            variants=session.variants_of(described) if plausible else None,
+            variants=variants_of(described) if plausible else None,
             provenance={"processor": processor()},
             **asked,
         )

@@ -11,7 +11,6 @@ import signal
 import sys
 from difflib import get_close_matches
 from importlib import import_module
-from itertools import pairwise
 from typing import Any
 
 import typer
@@ -31,7 +30,7 @@ PANELS = {
         "apply": "Write identified values into your own URDF or MJCF.",
         "report": "Identify a robot from a record and judge the result on one page.",
         "compare": "Find which of several studies predicts best.",
-        "excite": "Search a motion that excites the parameters within the limits.",
+        "excite": "Search for a motion that excites the parameters within the limits.",
         "simulate": "Simulate the closed loop of a study file and write its record.",
     },
     "Encoder": {
@@ -56,16 +55,6 @@ WENT = {
     "many files on a cluster",
 }
 """Verbs of earlier versions, with the sentence that names what to use instead."""
-
-
-class Verb(TyperCommand):
-    """A command, which refuses an empty -o: it would write into the folder where one stands."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> Any:
-        for option, value in pairwise([*args, "-"]):
-            if "--output=" in (option, value) or (option in ("-o", "--output") and not value):
-                ctx.fail("-o is empty; name a folder or file, or leave out -o")
-        return super().parse_args(ctx, args)
 
 
 class Verbs(TyperGroup):
@@ -93,7 +82,7 @@ class Verbs(TyperGroup):
         verb = typer.Typer(
             add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
         )
-        verb.command(cmd_name, cls=Verb)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
+        verb.command(cmd_name)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
         return get_command(verb)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -157,7 +146,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Make sure that the file descriptors 0 to 2 are open, if need be on os.devnull.
+    """Make sure that the file descriptors 0 to 2 are open, by os.devnull if needed.
 
     Otherwise a file that the program opens could get the number of a closed stream, and receive the
     text that a library prints.

@@ -1,4 +1,6 @@
-"""The option --repair of `symgen identify`: write a mended study, and offer one without the option."""
+"""The option --repair of `symgen identify`: write a mended study, or, without the option, offer to
+do so.
+"""
 
 from __future__ import annotations
 
@@ -48,10 +50,10 @@ def with_repair(
     arguments: Sequence[str],
     path: Path | None,
 ) -> str:
-    """Print a repair before the verdict, or offer one after it.
+    """Print a repair before the verdict, or offer a repair after the verdict.
 
     text : the printed result, which has the verdict.
-    repair : None if none was asked for.
+    repair : None if no repair was requested.
     arguments : robot and records of the command.
     """
     if repair is None:
@@ -73,7 +75,7 @@ def offered(result: Identification, arguments: Sequence[str]) -> str:
 
 
 def json_of(result: Identification, repair: Repair | None) -> str:
-    """Write the result as JSON, with the entry `repair` if a repair was asked for."""
+    """Write the result as JSON, with the entry `repair` if a repair was requested."""
     from runtime.ground.documents import json_text
 
     if repair is None:

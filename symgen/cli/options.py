@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -11,7 +12,21 @@ Text = str | None
 
 def folder(files: str) -> Any:
     """Make the option -o of a command; `files` names the written files in the help text."""
-    return typer.Option("-o", "--output", help=f"Folder for {files}.")
+    return output(f"Folder for {files}.")
+
+
+def output(text: str) -> Any:
+    """Make the option -o of a command with the help `text`.
+
+    An empty -o is refused: it would mean the folder where one stands.
+    """
+    return typer.Option("-o", "--output", parser=_place, metavar="PATH", help=text)
+
+
+def _place(given: str | Path) -> Path:
+    if not str(given):
+        raise typer.BadParameter("-o is empty; name a folder or file, or leave out -o")
+    return Path(given)
 
 
 RobotFile = Annotated[
@@ -49,7 +64,7 @@ Base = Annotated[
     Text,
     typer.Option(
         "--base",
-        help="fixed, moving or free: whether frame 0 stands, is a body whose motion is measured, or one whose motion and wrench are measured. Default: that of the robot file.",
+        help="Base of the robot. fixed: frame 0 stands still. moving: the motion of frame 0 is measured. free: the motion of frame 0 and the wrench on it are measured. Default: the base in the robot file.",
     ),
 ]
 Trust = Annotated[
@@ -138,7 +153,7 @@ At = Annotated[
     Text,
     typer.Option(
         help="Link of the robot file at which mass, centre and inertia of the load of the study are given, "
-        "such as tool0. Default: tool0, flange or the last one."
+        "such as tool0. Default: tool0, flange or the last link that the load can be mounted on."
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

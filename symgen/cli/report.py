@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of, variants_of
 
 
 def report(
@@ -31,7 +32,7 @@ def report(
 ) -> None:
     """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and judge the result.
 
-    A part that cannot be done is named on the page with its reason. Exit code 1 if the values
+    A part that cannot be done is named on the page with its reason. The exit code is 1 if the values
     cannot be used.
 
     With --columns, only the named parameters decide whether the encoder is fine enough.
@@ -44,8 +45,8 @@ def report(
         described = session.robot_of(robot, trust=trust, exact=exact, base=base)
         judged = {"side": side, "columns": session.names_of(columns)}
         study = session.changed(session.study_of_arguments(record), cestac=judged)
-        described = session.corrected(described, study)
-        model = session.model_of(described, study=study)
+        described = corrected(described, study)
+        model = model_of(described, study=study)
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
         records = records_of(study.record, model, study)
         result = assess(
@@ -53,7 +54,7 @@ def report(
             records,
             study,
             encoder=asked if encoder else (),
-            variants=session.variants_of(described),
+            variants=variants_of(described),
             progress=session.say,
         )
         runtime.report(result, results)

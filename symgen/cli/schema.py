@@ -1,6 +1,6 @@
 """The command `symgen schema`: print the JSON Schema of robot files, study files or results.
 
-Editors use the schema of robot files, programs that read results use the other schemas.
+Editors use the schema of robot files; programs that read results use the other schemas.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def schema(
     ] = "robot",
 ) -> None:
     """Print the JSON Schema of one kind of file. Robot files from `symgen new` refer to the
-    schema of robot files as robot.schema.json, beside them.
+    schema of robot files as robot.schema.json in the same folder.
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")

@@ -22,9 +22,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from symgen.cli.told import as_json, counter, error_data, lines_of, tell, time_left
-from symgen.update.models import corrected as corrected
-from symgen.update.models import model_of as model_of
-from symgen.update.models import variants_of as variants_of
 
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
@@ -40,7 +37,8 @@ BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 +
 def single_thread() -> None:
     """Set the number of BLAS threads to one, unless the user has set a number.
 
-    Matrices here are small, and results then agree in every bit. Call it before numpy is imported.
+    The matrices are small, and with one thread the results agree in every bit. Call this function
+    before numpy is imported.
     """
     from runtime.threads import BLAS_THREADS
 
@@ -50,11 +48,12 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """Report errors inside the block as messages of the command line; use one BLAS thread there.
+    """Report errors inside the block as messages of the command line, and run the block with one
+    BLAS thread.
 
-    Bad input gives one message on the error stream and exit code 2, a false certificate exit code
-    1, never a traceback. Warnings on the robot file and the record are printed as notes, after the
-    answer.
+    Bad input gives one message on the error stream and exit code 2; a false certificate gives exit
+    code 1. There is never a traceback. Warnings on the robot file and the record are printed as
+    notes, after the answer.
     """
     from runtime.ground.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
@@ -131,7 +130,7 @@ def fail(
 
     lines : whether line ends of the message are kept. Otherwise they are printed as backslash n,
         because a name in the message may contain any character.
-    data : what a program reads instead (`symgen.cli.told`).
+    data : data that a program reads in place of the message (`symgen.cli.told`).
     """
     from symgen.errors import printable
 
@@ -187,7 +186,7 @@ def on_terminal(text: str, width: int, verdict: Any = None) -> str:
 def _in_parts(table: list[str], width: int) -> list[str]:
     """Split a table of aligned columns into tables of at most `width`, if it has a first column.
 
-    Columns are where at least two blanks stand above each other in all lines.
+    Columns are separated by at least two blanks at the same place of all lines.
     """
     full = max(map(len, table))
     padded = [line.ljust(full) for line in table]
@@ -231,7 +230,7 @@ def robot_of(
     """Load the argument ROBOT of a command: a robot, or a generated module.
 
     trust : whether to run a module that was not emitted on this machine.
-    exact, base : as for `load_robot`.
+    exact, base : as in `load_robot`.
     """
     from runtime.core.model import load_model
     from runtime.reading.formats import is_measured
@@ -315,8 +314,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     for record in records[1:]:
         if Path(record).suffix.lower() in (".yaml", ".yml") or not is_measured(Path(record)):
             raise InputError(
-                "not a measured file; every RECORD after the first must be one, with the same columns, "
-                "units and side (joint or motor) as the first",
+                "this is no measured file; every RECORD after the first must be a measured file with "
+                "the same columns, units and side (joint or motor) as the first",
                 file=record,
             )
         like = study.record[-1]
@@ -336,11 +335,11 @@ def suggested_study(
 ) -> Study:
     """Write a study with the settings that the records need to `path`, and say what it sets.
 
-    What names and values do not show is marked `# ?` in the file; the command then ends here, with
-    exit code 0, and says what to fill in and how to go on.
+    Settings that names and values do not show are marked `# ?` in the file. The command then ends
+    with exit code 0, and says what to fill in and how to go on.
 
     robot : argument ROBOT, for the next command.
-    json : whether the output has JSON only; what is said then goes to the error stream.
+    json : whether the output is JSON only; the sentences then go to the error stream.
     """
     from runtime.compose import reader_of
     from runtime.ground.documents import json_text
@@ -415,7 +414,7 @@ def stopped(kept: str) -> NoReturn:
 def progress_lines() -> Iterator[None]:
     """Print one line for each stage of long work for the duration of the block.
 
-    Lines are printed on the error stream, after the first two seconds.
+    Lines are printed on the error stream, after the first two seconds, and equal lines only once.
     """
     import logging
     from time import monotonic
@@ -423,8 +422,12 @@ def progress_lines() -> Iterator[None]:
     from runtime.ground.progress import LOGGER
 
     class Stages(logging.Handler):
+        last = ""
+
         def emit(self, record: logging.LogRecord) -> None:
-            say(record.getMessage())
+            if record.getMessage() != self.last:
+                self.last = record.getMessage()
+                say(self.last)
 
     start, level = monotonic(), LOGGER.level
     handler = Stages()

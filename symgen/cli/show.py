@@ -36,7 +36,7 @@ def show(
         str | None,
         typer.Option(
             help="A model in symbols: pose, jacobian, inertia_matrix, inverse_dynamics, gravity, "
-            "... (a wrong name lists them)."
+            "...; a wrong name prints the list."
         ),
     ] = None,
     frame: Annotated[
@@ -103,7 +103,7 @@ def show(
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
+        options.output("File of the page. Default: <name>.html."),
     ] = None,
     packaged: Annotated[
         bool,
@@ -191,7 +191,8 @@ def page_file(regrouping: Regrouping, output: Path | None) -> Path:
 def model_text(
     robot: Robot, model: str, kind: str, asked: Mapping[str, Any], decimals: bool = False
 ) -> str:
-    """Return a symbolic model of a robot, such as its inertia matrix, as text in one of FORMATS.
+    """Return a symbolic model of a robot, such as its inertia matrix, as text in one of the formats
+    of `symgen show`.
 
     asked : options of --model that the user gave.
     decimals : whether to write coefficients without symbols as decimal numbers.

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from symgen.cli import options, session
+from symgen.update.models import corrected, model_of
 
 
 def simulate(
@@ -35,8 +36,8 @@ def simulate(
     """Simulate ROBOT under the controller of STUDY. Parameters are the values of the robot file, or
     those of `controller.values`.
 
-    The record is written as `identify` reads it, with the reference in columns qr1 ...; study.yaml
-    names it.
+    The simulated record is written in a form that `identify` reads, with the reference in the columns
+    qr1 ..., and study.yaml names this record.
     """
     with session.results_in(output) as results:
         import runtime
@@ -44,7 +45,7 @@ def simulate(
 
         described = session.robot_of(robot, trust=trust, exact=exact)
         settings = session.study_of_arguments([study], recorded=False)
-        model = session.model_of(session.corrected(described, settings))
+        model = model_of(corrected(described, settings))
         if settings.controller is None:
             session.fail(
                 f"{study} has no section `controller`; add this section, with law, rate and reference "

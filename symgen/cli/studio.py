@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from symgen.cli import options
 from symgen.cli.session import fail, reported_errors
 
 WATCHED = "from symgen.studio.child import watched; watched(); "
@@ -28,18 +29,19 @@ def studio(
     ] = None,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder in which the studio saves robot files, study files and results, and opens them again.",
+        options.output(
+            "Folder in which the studio saves robot files, study files and results, and opens them again."
         ),
     ] = Path("symgen-studio"),
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of this machine. Default: as the last time.")
+        int,
+        typer.Option(min=0, max=65535, help="Port of the server. Default: that of the last time."),
     ] = 0,
     renew: Annotated[
         bool,
-        typer.Option("--new-address", help="Take a new address; bookmarks of the old one end."),
+        typer.Option(
+            "--new-address", help="Use a new address; bookmarks of the old address no longer work."
+        ),
     ] = False,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")

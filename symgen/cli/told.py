@@ -1,4 +1,4 @@
-"""What a command tells on its error stream: lines for people, or JSON lines for programs.
+"""Messages of a command on its error stream: lines for people, or JSON lines for programs.
 
 SYMGEN_LINES=json symgen cestac arm.urdf study.yaml 2> lines.jsonl
 
@@ -30,7 +30,7 @@ def as_json() -> bool:
 
 
 def tell(line: str, **data: Any) -> None:
-    """Print a line for people, or the data that it says as one line of JSON."""
+    """Print a line for people, or its data as one line of JSON."""
     typer.echo(json.dumps(data) if as_json() else line, err=True)
 
 
@@ -45,7 +45,7 @@ def error_data(error: Exception) -> dict[str, Any]:
 
 
 def lines_of(what: str) -> Callable[[int, int], None]:
-    """Return a function that prints how much is done and the time left, every ten seconds."""
+    """Return a function that prints, every ten seconds, the finished steps and the time left."""
     start = last = monotonic()
 
     def count(done: int, total: int) -> None:
@@ -60,7 +60,9 @@ def lines_of(what: str) -> Callable[[int, int], None]:
 
 
 def counter() -> Callable[[int, int], None]:
-    """Return a function that tells the numbers of finished steps and of all steps, ten times a s."""
+    """Return a function that prints the number of finished steps and of all steps, at most ten
+    times a second.
+    """
     last, left = 0.0, time_left()
 
     def count(done: int, total: int) -> None:
@@ -76,8 +78,8 @@ def counter() -> Callable[[int, int], None]:
 def time_left() -> Callable[[int, int], float | None]:
     """Return a function of the numbers of finished steps and of all steps: time of the others, s.
 
-    (total - done) (t - t0)/(done - done0); t0 and done0 are those of the first call, so that steps
-    which were finished before do not count. None while no step is finished since then.
+    The time is (total - done) (t - t0)/(done - done0), with t0 and done0 of the first call, so that
+    steps which were finished before do not count. It is None until another step is finished.
     """
     first: list[tuple[float, int]] = []
 

@@ -44,7 +44,7 @@ Matrix = np.ndarray  # of three rows
 def array(entries: Any) -> Vector:
     """Return a vector of scalars, or a matrix from its rows; + - * and @ act on the scalars.
 
-    It cannot be changed in place, because several links may share it.
+    The array cannot be changed in place, because several links may share it.
     """
     made = np.array(entries, dtype=object)
     made.flags.writeable = False
@@ -87,7 +87,7 @@ class GraphAlgebra:
     robot : Robot
         The robot.
     written : bool
-        Whether numbers that formulas keep as written are inputs; if not, their values are used.
+        Whether numbers that formulas keep as written are inputs; otherwise, their values are used.
 
     Attributes
     ----------
@@ -129,16 +129,18 @@ class GraphAlgebra:
     def base_motion(self) -> tuple[str, ...]:
         """Names of the motion of a moving base: W10, W20, W30, WP10 .. WP30, VP10 .. VP30.
 
-        They are w0 (rad/s), wd0 (rad/s**2) and a0 (m/s**2): angular velocity and acceleration of
-        frame 0, and the acceleration of O_0 minus gravity, in the axes of frame 0. A fixed base has
-        none.
+        The vectors are w0 (rad/s), wd0 (rad/s**2) and a0 (m/s**2): angular velocity and
+        acceleration of frame 0, and the acceleration of O_0 minus gravity, in the axes of frame 0.
+        A fixed base has no such names.
         """
         families = BASE if self.robot.base_moves else ()
         return tuple(self.named(family, k, 0) for family in families for k in (1, 2, 3))
 
     @property
     def accelerations(self) -> tuple[str, ...]:
-        """Names of the accelerations of a free base in the order of its rows: of a0, then of wd0."""
+        """Names of the accelerations of a free base in the order of its rows: components of a0,
+        then of wd0.
+        """
         wd0, a0 = self.base_motion[3:6], self.base_motion[6:]
         return (*a0, *wd0) if self.robot.base_is_free else ()
 

@@ -62,7 +62,7 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
 def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Scalar]:
     """Return six closure residuals for each loop: three of position and three of orientation.
 
-    They are P_cut - P_twin, and the axial vector of A_cut' A_twin. If the cut joint is not
+    The residuals are P_cut - P_twin, and the axial vector of A_cut' A_twin. If the cut joint is not
     independent, its angle is a sum of other angles, and the orientations agree in all
     configurations: the last three entries are then 0.
     """
@@ -117,9 +117,9 @@ def newton(
 ) -> Array:
     """Solve r(q) = 0 by Newton's method with least-squares steps, from a start q (..., n).
 
-    Only the `columns` of q change, by at most STEP in each iteration. A state stops below the
-    tolerance, or after STALLED iterations without progress, independently of the other states. The
-    caller must check the residual at the end.
+    Only the `columns` of q change, by a limited step in each iteration. A state stops below the
+    tolerance, or after some iterations without progress (`STALLED`), independently of the other
+    states. The caller must check the residual at the end.
     """
     q, best, stalled = q.copy(), np.full(q.shape[:-1], np.inf), np.zeros(q.shape[:-1])
     going = np.ones(q.shape[:-1], dtype=bool)
@@ -176,7 +176,7 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
 def open_loops(robot: Robot) -> list[Scalar]:
     """Return the pose differences of the two frames at the cut joint of each loop, as graph nodes.
 
-    They are functions of all moving joints, each of which is independent here.
+    The differences are functions of all moving joints, each of which is independent here.
     """
     return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
 
@@ -272,7 +272,7 @@ class Assembly:
     def closest(self) -> Array:
         """Find the configuration with the smallest closure error, for loops that may not close.
 
-        It is the best result of several descents, in all free joints, from random configurations.
+        The result is the best of several descents, in all free joints, from random configurations.
         """
         rng = np.random.default_rng(4)
         starts = rng.uniform(-np.pi, np.pi, (DESCENTS, len(self.free)))

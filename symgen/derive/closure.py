@@ -6,8 +6,8 @@ The moving joints of the tree are linear functions of the *independent* joints,
 
 with constant n_ji and c_j. In serial robots and trees every joint is independent. In parallelograms
 the actuated joints are independent, and G = (n_ji). In general loops, the passive joints that no
-linear relation gives are independent too. They are called tied: the closure equations relate them
-to the actuated joints, qd_u = G_u qd_a. Then
+linear relation gives are independent too. These joints are called tied: the closure equations
+relate them to the actuated joints, qd_u = G_u qd_a. Then
 
     Gamma_a = G' Gamma_tree
 
@@ -44,8 +44,8 @@ class Closure:
     tied : tuple of int
         Independent passive joints: joints of general loops that only closure equations give.
     start : mapping
-        A configuration of all moving joints that closes the loops, rad or m; it picks the assembly
-        mode of a general loop.
+        A configuration of all moving joints that closes the loops, rad or m; the configuration
+        selects the assembly mode of a general loop.
     """
 
     robot: Robot
@@ -142,8 +142,8 @@ def parts(robot: Robot) -> int:
     """Return a common denominator D of the ratios between passive and independent joint angles.
 
     Every passive angle is a constant plus a sum of whole multiples of q_i/D. D is the least common
-    denominator of the declared ratios between angles. It is the product of the denominators if one
-    relation is put into another, or if a loop may do so.
+    denominator of the declared ratios between angles. If one relation is substituted into another,
+    or if a loop may require this, D is the product of the denominators.
     """
     joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
     chained = robot.loops or {f"q{j}" for j in relations} & {

@@ -17,7 +17,7 @@ resists the accelerations a_0 and wd_0 of the base with
 
     E = MP a_0 - MSP x wd_0 ,   NE = MSP x a_0 + JP wd_0 .
 
-With base parameters, YY = MZ = M = 0 for most links, and the terms in MP vanish.
+With base parameters, YY = MZ = M = 0 for most links, so that the terms in MP vanish.
 
 Coriolis matrix C(q, qd), from the Christoffel symbols of A, so that Ad - 2C is skew symmetric. A
 mass point at r in frame j has the velocity rd = w_j x r relative to the origin of the frame. The
@@ -210,7 +210,8 @@ def turned(R: Rotation, J: Tensor) -> Tensor:
 def parallel(P: Vector, AS: Vector, moved: Vector) -> Tensor:
     """Return the parallel-axis terms of an inertia tensor that is shifted by the vector P.
 
-    They are (P . AS + P . moved) E - P moved' - AS P', with moved = AS + MP P.
+    With the mass MP and the first moments AS of the composite link, the terms are (P . AS + P .
+    moved) E - P moved' - AS P', moved = AS + MP P.
     """
     trace = dot(P, AS) + dot(P, moved)
     outer = {(k, m): P[k - 1] * moved[m - 1] + AS[k - 1] * P[m - 1] for k, m in PLACES}

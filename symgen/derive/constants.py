@@ -133,7 +133,7 @@ def _angles(robot: Robot) -> Iterator[Expression]:
 def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
     """Yield the constant part of the angle of each cosine and sine in the torque laws of the user.
 
-    For instance 0.3 for the law cos(q1 + 0.3).
+    For the law cos(q1 + 0.3), for instance, the constant part is 0.3.
     """
     keys = [(e, j) for e in robot.elements if e.is_own for j in e.along]
     pending = [x for e, j in keys for x in (e.law(j), e.potential(j))]
@@ -154,7 +154,7 @@ def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
 def rows_of(robot: Robot) -> list[Expression]:
     """Return the coefficients with which friction, springs and other elements act on the joints.
 
-    They are the entries of the rows `along` and of the quadratic forms `form`.
+    The coefficients are the entries of the rows `along` and of the quadratic forms `form`.
     """
     tables = [table for e in robot.elements for table in (e.along, e.form)]
     return [c for table in tables for row in table.values() for c in row.values()]
@@ -182,7 +182,7 @@ def _calls(robot: Robot) -> Iterator[Call]:
 def radicands(robot: Robot) -> tuple[int, ...]:
     """Return the whole numbers whose square roots occur in a robot's description, smallest first.
 
-    Each is a prime, or a number that no small prime divides.
+    Each number is a prime, or has no small prime factor.
     """
     arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
     return tuple(sorted({int(c) for c in arguments if c is not None}))
@@ -203,22 +203,22 @@ def numbered(robot: Robot) -> Robot:
     """Replace each decimal number of a robot by a symbol, so that formulas keep it as written.
 
     The numbers are those of its lengths, gravity, joint relations, element rows and angles. If one
-    relation between joints is put into another, the ratios stay numbers, because the angles of the
-    joints need these ratios.
+    relation between joints is substituted into another, the ratios stay numbers, because the angles
+    of the joints need these ratios.
     """
     followed = {a for e in robot.constraints.values() for a in e.atoms}
     chained = any(f"q{j}" in followed for j in robot.constraints)
-    result = mapped(robot, keep_rationals, kept_angle)
+    result = mapped(robot, keep_rationals, symbolic_angle)
     if not chained:
         return result
-    return replace(result, constraints={j: kept_angle(e) for j, e in robot.constraints.items()})
+    return replace(result, constraints={j: symbolic_angle(e) for j, e in robot.constraints.items()})
 
 
 def keep_rationals(e: Expression) -> Expression:
     """Replace each rational coefficient of a polynomial by a symbol that has the same value.
 
-    Coefficients inside square roots and inverses are replaced too. Whole numbers up to
-    LARGEST_WHOLE stay numbers.
+    Coefficients inside square roots and inverses are replaced too. Whole numbers up to 12
+    (`LARGEST_WHOLE`) stay numbers.
     """
     total = Expression()
     for m, c in e.terms.items():
@@ -236,7 +236,7 @@ def keep_rationals(e: Expression) -> Expression:
     return total
 
 
-def kept_angle(e: Expression) -> Expression:
+def symbolic_angle(e: Expression) -> Expression:
     """Replace decimal numbers in an angle, and fractions with a large denominator, by symbols.
 
     Quarter turns and the multiples of a joint angle stay numbers.

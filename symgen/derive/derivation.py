@@ -3,7 +3,7 @@
 Every recursion runs once, in standard parameters:
 
     Gamma(q, qd, qdd, g, chi)        torques of the actuated joints, linear in chi
-    D_k(q, qd, qdd, g)               their columns, Gamma = sum_k D_k chi_k
+    D_k(q, qd, qdd, g)               columns of the torques, Gamma = sum_k D_k chi_k
     A_0j, P_0j                       poses of the frames
     r(q), dr/dq, Jd qd               closure equations of general loops
 
@@ -74,8 +74,8 @@ class Derivation(NamedTuple):
     def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """Convert torques of all moving joints to torques of the actuated joints, by virtual work.
 
-        They are G' Gamma, with G = dq/dq_a and the torques Gamma of the moving joints. Every
-        actuated joint has an entry, also if its torque is zero.
+        The result is G' Gamma, with G = dq/dq_a and the torques Gamma of the moving joints. Every
+        actuated joint has an entry, even if its torque is zero.
         """
         projected = self.geometry.closure.project(self.algebra, torque)
         return {i: projected.get(i, 0) for i in self.robot.joints}

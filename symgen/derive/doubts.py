@@ -93,7 +93,7 @@ def other_units(robot: Robot) -> list[str]:
 def equal_sides(robot: Robot) -> list[str]:
     """Warn of equal lengths with different names in a loop that may be meant as a parallelogram.
 
-    With one name for both lengths, the loop may be a parallelogram.
+    Only with one name for both lengths can symgen treat the loop as a parallelogram.
     """
     if not robot.loops:
         return []
@@ -130,7 +130,7 @@ def equal_sides(robot: Robot) -> list[str]:
 
 
 def far_starts(robot: Robot) -> list[str]:
-    """Warn of joints whose start position is far from the nearest one that closes the loops."""
+    """Warn of joints whose start position is far from the nearest position that closes the loops."""
     closed, longest = close(robot).start, robot.longest
     units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
     far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]

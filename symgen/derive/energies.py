@@ -107,8 +107,8 @@ def potential_energy(d: Derivation) -> Scalar:
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
     """Return twice the energy of an inertia or spring whose parameter is 1.
 
-    It is (G x)**2 for an element with a row G of coefficients, and x' B x for one with a matrix B.
-    x are the joint velocities (inertia) or the joint positions (spring).
+    The result is (G x)**2 for an element with a row G of coefficients, and x' B x for an element
+    with a matrix B. Here x are the joint velocities (inertia) or the joint positions (spring).
     """
     if j in e.along:
         s = d.algebra.linear(e.along[j], x)
@@ -236,7 +236,8 @@ def momentum_rate(d: Derivation) -> Columns:
 def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
     """Return the regressor of the wrench that the base exerts on the robot, in frame 0.
 
-    For each inertial parameter: the force, then the moment about the origin of frame 0.
+    For each inertial parameter, the column has the force, then the moment about the origin of frame
+    0.
     """
     found = {}
     for name, (p, j) in inertial_names(d.robot).items():

@@ -110,10 +110,10 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 class Draw:
     """A random geometry of a robot and `samples` random states, with exact values modulo a prime p.
 
-    It is a domain for `interpret`. `geometry` gives residues, shape (count, 1), for constants by
-    name, for numbers and square roots, and for half-angle tangents of the unit angles; this makes
-    `count` robots in the same states. All other residues are random. They depend on the seed and
-    the name of the quantity, not on the order in which they are computed.
+    A Draw is a domain for `interpret`. `geometry` gives residues, shape (count, 1), for constants
+    by name, for numbers and square roots, and for half-angle tangents of the unit angles; this
+    makes `count` robots in the same states. All other residues are random. Random residues depend
+    on the seed and the name of the quantity, not on the order in which they are computed.
     """
 
     def __init__(
@@ -206,7 +206,7 @@ class Draw:
     def _of_geometry(self, key: str | Call) -> Array:
         """Return the values modulo the prime p that replace a constant, pi or a square root.
 
-        They are random if no value was given.
+        The values are random if no value was given.
         """
         if key not in self._geometry:
             self._geometry[key] = self._random(str(key), 1)
@@ -365,8 +365,8 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
     """Return `count` primes p for exact arithmetic: modulo p, all sines and cosines of the fixed
     angles and all square roots of the robot exist.
 
-    p < 2**31, and p = -1 modulo 4 and 2D. Without a seed they are the largest such primes; with a
-    seed, the largest below a random number. Raises SymgenError if there are too few.
+    p < 2**31, and p = -1 modulo 4 and 2D. Without a seed, the result has the largest such primes;
+    with a seed, the largest below a random number. Raises SymgenError if there are too few.
     """
     primes = tuple(islice(candidates(robot, seed), count))
     if len(primes) == count:
@@ -394,7 +394,8 @@ def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
 
 
 def _is_prime(p: int) -> bool:
-    """Whether p is prime, for p = -1 modulo 4 from 8 to 3.2e9 only, as `candidates` has them.
+    """Whether p is prime; the test is for numbers p = -1 modulo 4 from 8 to 3.2e9, such as those of
+    `candidates`.
 
     For such p, this is the Miller-Rabin test with bases 2, 3, 5, 7, which is exact below 3.2e9.
     """

@@ -4,12 +4,12 @@
             P_ij = b e3 + d A_j e1 + r A_j e3
 
 Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles. The *carrier* of
-frame j is the last frame m before j whose z axis is not parallel to z_j, and
-mRj = A Rot(z, sum of angles). Angular velocities, joint axes and the axes of the root in a pose,
-which only rotate, are transformed from the carrier in one step: from there are C23 and S23. Any
-other vector is transformed from carrier to carrier too, and by one rotation about z between frames
-with parallel z axes. So the formulas have cosines of sums and differences of angles instead of
-products of cosines.
+frame j is the last frame m before j whose z axis is not parallel to z_j, and mRj = A Rot(z, sum of
+angles). Angular velocities, joint axes and the axes of the root in a pose, which only rotate, are
+transformed from the carrier in one step, which gives factors such as C23 and S23. Any other vector
+is transformed from carrier to carrier too, and by one rotation about z between frames with parallel
+z axes. So the formulas have cosines of sums and differences of angles instead of products of
+cosines.
 """
 
 from __future__ import annotations
@@ -217,7 +217,9 @@ class Frames:
         return v
 
     def position(self, j: int, i: int, seen_from: int) -> Vector:
-        """Return the vector from the origin of frame i to that of frame j, in frame `seen_from`."""
+        """Return the vector from the origin of frame i to the origin of frame j, in frame
+        `seen_from`.
+        """
         to, start = self.robot.path(j), self.robot.path(i)
         total = ZERO3
         for f in to:

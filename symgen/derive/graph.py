@@ -37,7 +37,7 @@ EVEN, ODD = {COS}, {SIN, SIGN, INV, "tanh"}
 class Symbol(NamedTuple):
     """An input of a derivation, such as q1 or the constant D3: its kind and its name.
 
-    Two inputs of one name and different kinds are different.
+    Two inputs with the same name and different kinds are different.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ class Graph:
         return Scalar(self, self.nodes[index], sign)
 
     def seal(self) -> None:
-        """Fix the names of all present nodes, so that no later derivation renames any of them."""
+        """Fix the names of all present nodes, so that no later derivation renames one."""
         self._sealed = len(self.nodes)
 
     def symbol(self, symbol: Symbol, *, fixed: bool = False) -> Scalar:

@@ -77,7 +77,7 @@ class LoopSystem:
 
     @cached_property
     def residual(self) -> list[Scalar]:
-        """The closure residuals r(q), one for each joint that they determine, as graph nodes."""
+        """The closure residuals r(q), one for each tied joint, as graph nodes."""
         return [self.rows[k] for k in self.equations]
 
     @cached_property
@@ -98,8 +98,8 @@ class LoopSystem:
         """Trace of A_cut' A_twin per loop: 3 if the loop closes, -1 if half a turn from closing.
 
         A_cut and A_twin are the orientations of the two frames at the cut joint. The axial vector
-        of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied is left out:
-        there the angle is a sum of other angles, and the orientations always agree.
+        of A_cut' A_twin is zero in both cases. A loop whose cut joint is not tied is left out: at
+        this joint, the angle is a sum of other angles, and the orientations always agree.
         """
         geometry = self.derivation.geometry
         ends = loop_ends(geometry.robot, geometry.algebra, geometry.closure)
@@ -139,8 +139,8 @@ class LoopSystem:
     def mode(self) -> float:
         """Return the sign of det(dr/dq_tied) at the start, which identifies the assembly mode.
 
-        r are the closure residuals, q_tied the joints that they determine. The sign stays the same
-        until the mechanism passes a dead point, hence within one assembly mode.
+        r are the closure residuals, and q_tied are the joints that these equations determine. The
+        sign stays the same until the mechanism passes a dead point, hence within one assembly mode.
         """
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
 
@@ -158,8 +158,8 @@ class LoopSystem:
     def pace(self) -> float:
         """Return a step of the actuated joints so small that no passive joint moves far.
 
-        It is computed from the rates at the start configuration (PACE); in rad, or as a fraction of
-        the longest length if prismatic.
+        The step is computed from the rates at the start configuration and the limits in `PACE`, in
+        rad or, for a prismatic joint, as a fraction of the longest length.
         """
         J = self.jacobian_floats(self.start)
         n = self.tied.start
@@ -168,9 +168,10 @@ class LoopSystem:
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
-        """Return how many turns each tied (dependent) joint makes per turn of the actuated joint.
+        """Return the number of turns of each tied (dependent) joint per turn of the actuated joint.
 
-        None if the actuated joint cannot turn fully, is prismatic, or is not the only one.
+        The result is None if the actuated joint cannot turn fully, is prismatic, or is not the only
+        actuated joint.
         """
         if [self.robot.frame(j).sigma for j in self.robot.joints] != [REVOLUTE]:
             return None

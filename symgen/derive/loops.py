@@ -1,12 +1,12 @@
 """Relations between passive and independent joints of closed loops: declared, or linear and proved.
 
-Loop: frame `cut` (one branch) and frame `twin` (sigma 2, other branch) coincide, 0T_cut = 0T_twin.
-At a closed configuration the passive rates are G = -J_u^+ J_a. If G has the same whole numbers
-along a motion, the relation q_u = G q_a + c is linear, and its constant c is searched among the
-fixed angles or lengths of the loops (`_offset`). The relation is then *proved*: the two frames must
-coincide identically over F_p, with random lengths, so equal lengths must be equal symbols. The
-second branch of a parallelogram (anti-parallelogram) is not linear, and is never accepted as
-linear. Declared relations and the mobility of the mechanism are checked too.
+A loop closes if its frame `cut` (on one branch) and its frame `twin` (sigma 2, on the other branch)
+coincide, 0T_cut = 0T_twin. At a closed configuration the passive rates are G = -J_u^+ J_a. If G has
+the same whole numbers along a motion, the relation q_u = G q_a + c is linear, and its constant c is
+searched among the fixed angles or lengths of the loops (`_offset`). The relation is then *proved*:
+the two frames must coincide identically over F_p, with random lengths, so equal lengths must be
+equal symbols. The second branch of a parallelogram (anti-parallelogram) is not linear, and is never
+accepted as linear. Declared relations and the mobility of the mechanism are checked too.
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ def _configurations(assembly: Assembly) -> Iterator[Array]:
     """Yield joint configurations in which all loops of the mechanism close.
 
     If the robot has a `start` and a closed configuration near it is found, only this configuration
-    is given. Otherwise the search begins at random configurations and, if none of them closes, at
-    the one in which the loops are nearest to closing.
+    is yielded. Otherwise the search begins at random configurations and, if none of them closes, at
+    the configuration in which the loops are nearest to closing.
     """
     robot, rng, closed = assembly.robot, np.random.default_rng(3), False
     wanted = {j: x for j, x in robot.start.items() if j in assembly.free}
@@ -140,8 +140,8 @@ def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
 def _general(assembly: Assembly, q: Array) -> Closure:
     """Return the joint relations of general (not linear) loops, with q as the start configuration.
 
-    It has the declared relations and the sums of angles that planar loops fix. All other passive
-    joints are tied: only the closure equations give them.
+    The result has the declared relations and the sums of angles that planar loops fix. All other
+    passive joints are tied: only the closure equations give them.
     """
     relations: dict[int, Relation] = {}
     configuration = assembly.configuration(q)
@@ -244,8 +244,8 @@ def _samples(assembly: Assembly, q: Array) -> list[Sample]:
     configuration that closes the loops.
 
     At the changed constants, equal values of different symbols differ. The list is empty if the
-    loops do not close there, and has only the constants of the file if an expression has no value
-    there.
+    loops do not close with the constants, and has only the constants of the file if an expression
+    has no value at the changed constants.
     """
     rng, robot = np.random.default_rng(7), assembly.robot
     angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
@@ -307,8 +307,8 @@ def _beside(robot: Robot, row: Mapping[int, Expression]) -> Expression:
 def _fixed(assembly: Assembly, hinge: bool) -> list[Expression]:
     """Return the candidate terms for the constant of a joint relation: fixed angles, or lengths.
 
-    They are from the frames of the loops and from the declared relations: without quarter turns,
-    each once up to sign. Constants added to a joint position are left out.
+    The terms come from the frames of the loops and from the declared relations, without quarter
+    turns, each once up to its sign. Constants added to a joint position are left out.
     """
     robot, own = assembly.robot, REVOLUTE if hinge else PRISMATIC
     around = {k for l in robot.loops for k in {*robot.path(l.cut)} ^ {*robot.path(l.twin)}}
@@ -331,7 +331,7 @@ def _coincide(closure: Closure) -> bool:
     """Whether the two frames at the cut joint of each loop coincide, tested with random lengths and
     positions modulo a prime p.
 
-    This is the proof of the relations in `closure`.
+    The test proves the relations in `closure`.
     """
     draw, algebra = Draw(closure.robot, 17, 3), GraphAlgebra(closure.robot)
     rows = interpret(coincidence(loop_ends(closure.robot, algebra, closure)), draw)
@@ -396,7 +396,8 @@ def _contradiction(
 ) -> DescriptionError:
     """Return an error for joint relations of the file with which the loops cannot close.
 
-    It gives both forms of each such relation, and how far the loop is open with the declared ones.
+    The error gives both forms of each such relation, and how far the loop is open with the declared
+    relations.
     """
     sides = []
     for j, e in declared.items():

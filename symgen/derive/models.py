@@ -1,9 +1,10 @@
 """Models of a robot, such as inverse dynamics and the inertia matrix: the table of all of them.
 
 A model has a name, arguments, a shape, a unit, and the formulas of its entries, which come from a
-derivation. They are given in cases; each case has its own values for inputs of the recursion, such
-as qdd = 0. `Model.values` writes the formulas into a new graph. Code generators, symbols, the
-certificate and the pages iterate over the table MODELS. A new model is one entry there.
+derivation. The entries are grouped in cases; each case has its own values for inputs of the
+recursion, such as qdd = 0. `Model.values` writes the formulas into a new graph. Code generators,
+symbols, the certificate and the pages iterate over the table MODELS. A new model is one entry of
+this table.
 """
 
 from __future__ import annotations
@@ -118,7 +119,7 @@ class Model(NamedTuple):
     instead : str
         Advice for the user if the model has no recursion: another model or form that works.
     denominator : str
-        Common divisor of its entries, if the closed form gives it apart: "det A".
+        Common divisor of its entries, such as "det A", if the closed form states it separately.
     result : str
         Name of the array in generated code; empty if no generated code has the function.
     symbolic : bool
@@ -136,15 +137,16 @@ class Model(NamedTuple):
     page : int
         Its position on the page of a robot, from 1; 0 if it is not shown there.
     case_of : str
-        Model that equals it if the arguments missing here are zero: Python modules call that model.
+        More general model that equals this model if its further arguments are zero; Python modules
+        call the general model.
     option : str
         Option of `symgen generate --with` that adds it; empty if it is always generated.
     latex : str
         The letter in LaTeX; default: `letter` in bold.
     base : str
         What a moving base changes: READ if the model takes the motion of the base as its first
-        argument, UNDEFINED if it has no meaning there, RELATIVE if it is that of frame 0 at rest
-        and without gravity.
+        argument, UNDEFINED if it has no meaning on a moving base, RELATIVE if it describes the
+        robot with frame 0 at rest and without gravity.
     """
 
     name: str
@@ -230,7 +232,7 @@ class Model(NamedTuple):
         """Return the entries of the model for the parameters, frames and inputs of a request.
 
         rewrite : graph to write the entries into, if several models of the same request share one.
-        closed : whether to use the form that is meant to be multiplied out. Of a symmetric matrix,
+        closed : whether to use the form that multiplies out to fewer terms. Of a symmetric matrix,
         only entries on and above the diagonal are returned.
         """
         cases = (closed and self.closed) or self.cases
@@ -305,7 +307,7 @@ HOMOGENEOUS = (0, 0, 0, 1)  # last row of a pose
 def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]:
     """Return replacements of inputs that set joint velocities (qd) or accelerations (qdd) to zero.
 
-    If `tied` is true, those of the tied passive joints are zero too.
+    If `tied` is true, the inputs of the tied passive joints are zero too.
     """
     independent = d.closure.independent if tied else d.robot.joints
     letter = {"qd": "QP", "qdd": "QDP"}
@@ -335,7 +337,7 @@ def _weightless(d: Derivation) -> dict[Symbol, Input]:
 def _at_rest(d: Derivation, *families: str) -> dict[Symbol, Input]:
     """Return replacements of inputs that set the motion of a moving base to zero.
 
-    families : those that are set to zero, among W, WP and VP; default: all.
+    families : families of inputs that are set to zero, among W, WP and VP; default: all.
     """
     return {
         Symbol("base", name): ZERO
@@ -377,8 +379,8 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
 def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
     """Yield the columns of A: column i is Gamma for qdd_i = 1, from rest and without gravity.
 
-    The first columns of a free base are those of a unit of a0 and of wd0.
-    A tied passive joint then has the acceleration G = dq_u/dq_i.
+    For a free base, the first columns belong to a unit of a0 and of wd0. A tied passive joint then
+    has the acceleration G = dq_u/dq_i.
     """
     named, common = d.algebra.named, _still(d, "qd", "qdd") | _weightless(d)
     common |= _without(d, lambda e: e.kind == "inertia")
@@ -438,7 +440,7 @@ def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
 def _momentum_regressor(d: Derivation, r: Request) -> Iterator[Case]:
     """Yield the regressor of the momentum p = A qd.
 
-    It is the regressor of Gamma at rest and without gravity, with qd in place of qdd.
+    The result is the regressor of Gamma at rest and without gravity, with qd in place of qdd.
     """
     elements = element_names(d.robot)
     moved = {

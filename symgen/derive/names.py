@@ -84,7 +84,8 @@ MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_moxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za
 
 
 def families_of(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the families of the given names, such as W for W12, in the order of FAMILIES.
+    """Return the families of the given names, such as W for W12, in the order of the table
+    `FAMILIES`.
 
     A product or a sum of names belongs to no family.
     """

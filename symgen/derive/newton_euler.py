@@ -222,9 +222,9 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
     """Return the torques {j: Gamma_j} that move the links, by the inward recursion.
 
-    Every moving joint of the tree has an entry; friction and other elements are not included. A
-    free base has the force and the moment that move it as six more entries (BASE_ROWS). K maps a
-    standard parameter's name to its scalar; a parameter that is not in K counts as 0.
+    Every moving joint of the tree has an entry; friction and other elements are not included. For a
+    free base, the force and the moment that move it are six more entries, with the keys -5 ... 0. K
+    maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
     """
     robot, geometry, vector = motion.robot, motion.geometry, motion.vector
     f: dict[int, Vector] = dict.fromkeys(range(len(robot.frames) + 1), ZERO3)

@@ -69,7 +69,7 @@ def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
 def acting(e: Element, j: int) -> dict[Any, Expression]:
     """Return the coefficients with which an element parameter, such as FV2, acts on the joints.
 
-    They are its row {joint: G}, or its form {(i, k): B} with i <= k.
+    The coefficients are the row {joint: G} of the element, or its form {(i, k): B} with i <= k.
     """
     form = {place: b for place, b in sorted(e.form.get(j, {}).items()) if place[0] <= place[1]}
     return form or dict(e.along[j])

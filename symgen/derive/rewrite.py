@@ -48,7 +48,8 @@ Inputs = Mapping[Symbol, Input]
 
 
 class ByNode(Draw):
-    """Random values modulo a prime p, with the sign of each velocity independent of all others.
+    """Random values modulo a prime p, with the sign of each velocity independent of all other
+    signs.
 
     sign(K qd) is not treated as sign(qd), since K may be negative.
     """
@@ -70,8 +71,8 @@ class Rewrite:
     source : GraphAlgebra
         The graph of the derivation.
     inputs : mapping
-        {input: its replacement}: a symbol, a constant expression, or a function that returns a
-        value in the new graph. Other inputs stay as they are.
+        {input: its replacement}, which is a symbol, a constant expression, or a function that
+        returns a value in the new graph. Other inputs stay as they are.
     """
 
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
@@ -93,8 +94,8 @@ class Rewrite:
         """Copy the nodes `outputs` of the derivation to the new graph; replace `inputs` in this
         call only.
 
-        These replacements have priority over the general ones. Names of intermediate variables that
-        depend on them end in `tag`.
+        These replacements have priority over those of the Rewrite. Names of intermediate variables
+        that depend on a replacement end in `tag`.
         """
         self._case = inputs or {}
         self._tag = tag
@@ -131,8 +132,9 @@ class Rewrite:
     def _name(self, node: Node, image: Scalar, *, merged: bool) -> None:
         """Give a copied node the name of its original.
 
-        A node merged with an earlier one gets no name of a RECURSIVE family. Otherwise U = DV - WP,
-        if it equals a product in WP = DV - product, would turn the recursion around.
+        A node that was merged with an earlier node gets no name of a quantity of the recursion,
+        such as U or WP. Otherwise U = DV - WP, if it equals a product in WP = DV - product, would
+        turn the recursion around.
         """
         signed = image if node.name_sign > 0 else -image
         tag = self._tag if node.index in self._replaced else ""

@@ -43,8 +43,9 @@ class Angles:
     exact : bool
         Whether all angles stay as written in the file.
     near : list of tuple
-        Each angle that differs from a multiple k pi/12 by at most SNAP and more than ALL_DIGITS:
-        its name (joint, angle and line), its value in the file (rad), and k.
+        Each angle that differs from a multiple k pi/12 by at most 1e-4 rad (`SNAP`), but by more
+        than rounding (`ALL_DIGITS`): its name (joint, angle and line), its value in the file (rad),
+        and k.
     """
 
     exact: bool
@@ -65,8 +66,8 @@ class Angles:
         """Write which angles near multiples of pi/12 were rounded: a text for file headers, and
         notes for the user.
 
-        If angles were rounded by more than TOLD, a note names the largest change, and an
-        AngleWarning is issued. Both results are empty if the file has no such angle.
+        If angles were rounded by more than 1e-9 rad (`TOLD`), a note names the largest change, and
+        an AngleWarning is issued. Both results are empty if the file has no such angle.
         """
         changes = [
             (k * (math.pi / 12) - angle, name, angle, k)

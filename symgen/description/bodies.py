@@ -53,9 +53,11 @@ def _excess(tensor: Array, names: Sequence[str]) -> str:
 
 
 def _other_products(tensor: Array) -> str:
-    """Say which other products make a body of a tensor that no body has; "" if none clearly does.
+    """Say which change of the products of inertia would make an impossible tensor possible; "" if
+    no change clearly does.
 
-    CAD writes products with the other sign (SolidWorks: positive), or six numbers in another order.
+    CAD programs write products with the other sign (SolidWorks: positive), or the six numbers in
+    another order.
     """
     xx, yy, zz = np.diag(tensor)
     xy, xz, yz = tensor[0, 1], tensor[0, 2], tensor[1, 2]
@@ -80,15 +82,17 @@ def _other_products(tensor: Array) -> str:
 
 
 def _violation(tensor: Array) -> float:
-    """Compute how far a tensor is from that of a body, of its largest moment; 0 or less: it is one."""
+    """Compute by how much a tensor violates the conditions of a body, relative to its largest
+    moment; 0 or less means that a body has it.
+    """
     small, middle, large = np.linalg.eigvalsh(tensor)
     return float(max(-small, large - small - middle) / max(abs(large), abs(small), 1e-300))
 
 
 def impossible_links(robot: Robot) -> tuple[tuple[int, str], ...]:
-    """Find the links whose inertia no body can have: the frame, and a sentence.
+    """Find the links whose inertia no body can have, and return the frame and a sentence for each.
 
-    The inertias are those of the links of a URDF; otherwise `values`, of each link as far as given.
+    The inertias are those of the links of a URDF, or else the given `values` of each link.
     """
     if robot.impossible:
         return robot.impossible
@@ -103,7 +107,7 @@ def impossible_links(robot: Robot) -> tuple[tuple[int, str], ...]:
 def _impossible(given: Sequence[float | None]) -> str:
     """Explain why no body has the ten parameters of a link; None is a parameter that is not given.
 
-    With parameters missing, a moment about an axis is judged by those of its first moments that are
+    If parameters are missing, a moment about an axis is judged with the first moments that are
     given: I_zz = ZZ - (MX^2 + MY^2) / M >= 0.
     """
     ten = np.array([0.0 if x is None else x for x in given])

@@ -1,18 +1,19 @@
-"""Inertias that a body can have, and no link of this robot: units of CAD, the wrong point, products.
+"""Inertias that a body can have, but no link of this robot, because of units of CAD, a wrong
+reference point or wrong products.
 
 The radius of gyration rho of a link is the root mean square distance of its mass from its centre of
 mass; a ball of the same mass and rho has the density D.
 
     rho = root(tr I / (2 M))        D = M / (4 pi/3 (rho root(5/3))^3)
 
-A moving link is not larger than the robot, and no metal is denser than 22600 kg/m^3. The bounds leave
-a margin to what 2600 links of 123 URDF files have, median of D 400 kg/m^3; beyond them are errors and
-numbers that stand for none. An I in g mm^2 makes rho 31623 times, in kg mm^2 1000 times, in g m^2 31.6
-times too large.
+A moving link is not larger than the robot, and no metal is denser than 22600 kg/m^3. The bounds
+leave a margin to the values of 2600 links in 123 URDF files, whose median of D is 400 kg/m^3.
+Values beyond the bounds are errors or placeholders. An I in g mm^2 makes rho 31623 times, in kg
+mm^2 1000 times, in g m^2 31.6 times too large.
 
-Moments about the origin of a link are those of a body, too. So this error is told only of many links
-at once: of right files, every tenth link with a centre far from its origin has moments that are
-still those of a body after the term of Huygens is subtracted.
+Moments about the origin of a link are possible moments of a body, too. So this error is reported
+only for many links at once: even in correct files, every tenth link with a centre far from its
+origin still has possible moments after the term of Huygens is subtracted.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ class Held:
     c : ndarray, shape (3,), m
         Centre of mass from the origin of the link, in the axes of I.
     I : ndarray, shape (3, 3), kg m^2
-        About the centre of mass.
+        Inertia tensor about the centre of mass.
     """
 
     j: int
@@ -97,19 +98,21 @@ class Held:
 
     @property
     def stated(self) -> bool:
-        """Whether the inertia is that of a body of some mass, and not a placeholder."""
+        """Whether the file states a real inertia with mass, and not a placeholder."""
         moments = np.diag(self.I)
         return self.M > PLACEHOLDER and np.ptp(moments) > EQUAL * moments.max()
 
     def by(self, remedy: Remedy) -> float:
-        """Compute the density after a remedy, kg/m^3."""
+        """Compute the density after the remedy, kg/m^3."""
         return float(self.density * remedy.mass**2.5 / remedy.moments**1.5)
 
 
 def from_cad(robot: Robot) -> list[str]:
-    """Return a sentence on each kind of inertia that is probably another quantity, or in other units.
+    """Return a sentence on each kind of inertia that is probably another quantity, or in other
+    units.
 
-    The inertias are those of the links of a URDF or MJCF; otherwise `values`, of links with all ten.
+    The inertias are those of the links of a URDF or MJCF, or else the `values` of links with all
+    ten parameters.
     """
     bodies = [
         body
@@ -143,10 +146,10 @@ def from_cad(robot: Robot) -> list[str]:
 
 
 def _size(body: Held, beside: float, reach: float, beside_another: bool = False) -> str:
-    """Judge the size of a link: far, thin or dense; "" for that of a link.
+    """Judge the size of a link: far, thin or dense; "" if a link can have this size.
 
-    beside : length of the frames beside the link, m. reach : sum of the lengths of the robot, m.
-    beside_another : whether another link of the robot has the same error.
+    beside : length of the neighbouring frames, m. reach : sum of the lengths of the robot, m.
+      beside_another : whether another link of the robot has the same error.
     """
     if body.rho > FAR * max(reach, 1.0):
         return "far"
@@ -188,10 +191,10 @@ def _names(bodies: Sequence[Held]) -> str:
 
 
 def _about_origin(bodies: Sequence[Held]) -> str:
-    """Ask whether the moments of most links are about their origins: without M (c'c 1 - c c'), they
-    are still those of bodies.
+    """Ask whether the moments of most links are about their origins, because bodies can have them
+    even without M (c'c 1 - c c').
 
-    Of one link, this tells nothing: every tenth right link passes.
+    A single link proves nothing: every tenth correct link passes this test.
     """
     told = {b.M: b for b in bodies if b.stated and np.linalg.norm(b.c) > APART * b.rho}
     passed = [
@@ -222,7 +225,7 @@ def _held(robot: Robot) -> Iterator[Held]:
 
 
 def _lengths(robot: Robot) -> tuple[Mapping[int, float], float]:
-    """Compute the largest length of the frames beside each link, and the sum of all lengths, m."""
+    """Compute the largest length of the frames next to each link, and the sum of all lengths, m."""
     length = {
         f.j: math.hypot(*(e.value(robot.constants) for e in (f.b, f.d, f.r0))) for f in robot.frames
     }

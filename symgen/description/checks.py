@@ -122,7 +122,7 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> Iterator[
 
 
 def _check_base(robot: Any) -> Iterator[Problem]:
-    """Check that a base that moves is of a kind with models, outside every loop and its names."""
+    """Check that a moving base has a known kind, belongs to no loop, and that its names are free."""
     if not robot.base_moves:
         return
     for loop in robot.loops:
@@ -245,7 +245,7 @@ def _check_exact(e: Expression, path: Path, *, angle: bool) -> Iterator[Problem]
 def _other_sigma(f: Frame) -> str:
     """Suggest another joint type sigma if the row of frame `f` looks like a joint of another type.
 
-    Returns "" if the position q_j is where sigma expects it.
+    Returns "" if the position q_j is in the column that sigma requires.
     """
     if moves(f.theta) or (f.sigma == PRISMATIC and moves(f.r)):
         return ""

@@ -41,7 +41,7 @@ def corrected(robot: str | Path | Robot, study: Any) -> Robot:
     Raises
     ------
     DescriptionError
-        An entry that no robot file may have; the message names it.
+        The study has an entry that no robot file may have; the message names this entry.
 
     Examples
     --------

@@ -52,7 +52,9 @@ def khalil_frames(frames: tuple[Frame, ...]) -> tuple[Frame, ...]:
 
 
 def frames_text(robot: Any) -> str:
-    """Say in which frames parameters are, if the file of the robot has a classic table; else ""."""
+    """Say to which frames the parameters refer, if the file of the robot has a classic table;
+    otherwise, return "".
+    """
     if not robot.distal:
         return ""
     values = f", but `values` of {robot.file or robot.name} in those of its classic table"
@@ -71,7 +73,7 @@ def khalil_values(robot: Any) -> dict[str, float]:
 
         MS' = ms + M p,     J' = R J R' + 2 (ms p) E - p ms' - ms p' + M (p p E - p p')
 
-    A parameter is converted if all values that it depends on are given. Raises DescriptionError if
+    A parameter is converted if all values on which it depends are given. Raises DescriptionError if
     a given value enters no converted parameter; the message names the missing values.
     """
     values = dict(robot.values)
@@ -99,7 +101,8 @@ def khalil_values(robot: Any) -> dict[str, float]:
 
 
 def _transport(alpha: float, d: float) -> dict[str, dict[str, float]]:
-    """Return each parameter of a link in Khalil's frame as a combination of those at its far end.
+    """Return each parameter of a link in Khalil's frame as a combination of the parameters at its
+    far end.
 
     The result is {parameter: {parameter at the far end: coefficient that is not zero}}.
     """

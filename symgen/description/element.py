@@ -5,12 +5,12 @@ For each key j, an element has one standard parameter c, named family + key (for
     along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
     form  {j: B}:  Gamma += c B qdd | c B qd | c B q
 
-The law of each kind is an expression in KINDS, in which q, qd, qdd mean s, sd, sdd. A new kind is
-one entry in KINDS (docs/contributing.md). A column is an element with a law of the user, in s, sd,
-q1, qd1 ... of any joints, constants and scalars. This law is a torque, or an energy U with
-Gamma += c dU/dq. A form is possible only for the laws qdd, qd and q. If `when` is given, a viscous
-or coulomb element acts only in motion along s in this direction. In a law, channel.NAME is the
-constant NAME as a function of time, and tau_model is the torque that the rest of the model
+The law of each kind is an expression in the table `KINDS`, in which q, qd, qdd mean s, sd, sdd. A
+new kind is one entry of this table (docs/contributing.md). A column is an element with a law of the
+user, in s, sd, q1, qd1 ... of any joints, constants and scalars. This law is a torque, or an energy
+U with Gamma += c dU/dq. A form is possible only for the laws qdd, qd and q. If `when` is given, a
+viscous or coulomb element acts only in motion along s in this direction. In a law, channel.NAME is
+the constant NAME as a function of time, and tau_model is the torque that the rest of the model
 transmits at the joint.
 """
 
@@ -191,7 +191,7 @@ def _law(text: str | None, declared: Any) -> Expression | None:
 
 
 def _scalar(name: str, given: Any) -> LawScalar:
-    """Make a nonlinear constant (LawScalar) of an element from its default in the table KINDS.
+    """Make a nonlinear constant (LawScalar) of an element from its default in the table `KINDS`.
 
     The default is a fixed number, or bounds and a start value.
     """
@@ -256,8 +256,8 @@ class Element:
 
     @property
     def scalars(self) -> dict[str, LawScalar]:
-        """Constants on which the law depends nonlinearly, by name: those of the robot file, or
-        defaults.
+        """Constants on which the law depends nonlinearly, by name, from the robot file or by
+        default.
         """
         kind = KINDS.get(self.kind)
         return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
@@ -302,10 +302,10 @@ class Element:
         return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
-        """Return the torque law of the element for frame j as an expression: the torque along s = G
-        q if the parameter is 1.
+        """Return the torque law of the element for frame j as an expression: the torque along the
+        coordinate s = G q for the parameter value 1.
 
-        It is zero if the law is an energy.
+        The law is zero if the user gives an energy.
         """
         return self._of_key(self.torque or KINDS[self.kind].torque, j)
 
@@ -316,9 +316,9 @@ class Element:
     def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
         """Return the element's torque along the coordinate s = G q, and torques at single joints.
 
-        They are those for frame j and the parameter value 1. With the torque x along s and the
-        energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect to
-        s. The second result maps each joint i that U names to dU/dq_i.
+        The torques are those for frame j and the parameter value 1. With the torque x along s and
+        the energy U, Gamma = G' x + dU/dq_i. The torque x includes the derivative of U with respect
+        to s. The second result maps each joint i that U names to dU/dq_i.
         """
         law, U = self.law(j), self.potential(j)
         joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
@@ -329,7 +329,7 @@ class Element:
         """Whether the element has a special law: not inertia, viscous or Coulomb friction, offset
         or spring.
 
-        This includes every law that the user writes, and every law with nonlinear constants.
+        Every law that the user writes, and every law with nonlinear constants, is special.
         """
         return (
             bool(self.torque or self.energy or self.scalars)

@@ -334,7 +334,7 @@ ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
-    """Write a rational as an exact decimal of at most PLACES places, else as p/q.
+    """Write a rational as a decimal if few decimal places make it exact, else as p/q.
 
     If `fractions` is true, halves, quarters and eighths are written as p/q too.
     """
@@ -408,8 +408,8 @@ def _atom(a: Atom) -> Expression:
 def _sqrt_of_rational(c: Fraction) -> Expression:
     """Return the square root of a rational as a rational times square roots of primes.
 
-    sqrt(m/n) = sqrt(m n)/n, and m n is factored by trial division up to LARGEST_PRIME; a remaining
-    factor stays under one root.
+    sqrt(m/n) = sqrt(m n)/n, and m n is factored by trial division with primes up to 1000; a
+    remaining factor stays under one root.
     """
     if c < 0:
         raise ValueError("square root of a negative number")
@@ -636,7 +636,7 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
 def ratio(x: float) -> Fraction:
     """Convert x to a simple fraction that rounds to x, such as 1/3, else to its shortest decimal.
 
-    The denominator of the fraction is at most LARGEST_RATIO.
+    The denominator of the fraction is limited (`LARGEST_RATIO`).
     """
     near = Fraction(x).limit_denominator(LARGEST_RATIO)
     return near if float(near) == x else Fraction(repr(x))

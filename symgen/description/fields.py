@@ -86,7 +86,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Given:
-    """A field value added by the reader of a robot file, not written there, such as the file name.
+    """A field value that the reader of a robot file adds, such as the file name.
 
     The file has no key for this field.
     """

@@ -20,6 +20,7 @@ from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError, require
 
+LOOPS_ENDING = ".loops.yaml"
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
 BASES = ("fixed", "moving", "free")
 WRITTEN = (".yaml", ".yml", ".urdf")  # suffixes of the formats that are written
@@ -70,7 +71,7 @@ def load_robot(
         an AngleWarning names the largest change, if it exceeds 1e-9 rad.
     base : str, optional
         `moving`: frame 0 is a body whose motion is measured; `free`: the wrench on this body is
-        measured too; `fixed`: it stands. Default: that of the file.
+        measured too; `fixed`: frame 0 stands still. Default: the base of the file.
 
     Returns
     -------
@@ -96,7 +97,7 @@ def load_robot(
 
 
 def robot_of(robot: str | Path | Robot) -> Robot:
-    """Return a robot as it is, or that of a packaged name or a file.
+    """Return a Robot as it is, or load a packaged robot by name, or a robot file.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def robot_of(robot: str | Path | Robot) -> Robot:
 
 
 def on_base(robot: Robot, base: str | None) -> Robot:
-    """Return the robot with a fixed, moving or free base; None leaves that of the file."""
+    """Return the robot with a fixed, moving or free base; None keeps the base of the file."""
     if base is None:
         return robot
     if not isinstance(base, str) or base not in BASES:
@@ -251,11 +252,18 @@ def _beside(path: Path) -> Callable[[str, int], bytes]:
     return read
 
 
+def is_loops_file(name: str) -> bool:
+    """Whether a file of this name has the loops of a URDF or MJCF beside it."""
+    from symgen.description.loops_file import EXPORTED  # numpy
+
+    return name.lower().endswith((LOOPS_ENDING, EXPORTED))
+
+
 def loops_beside(path: Path) -> Any:
     """Return the LoopsText of the file with the loops of a URDF or MJCF, or None if there is none.
 
-    It is NAME.loops.yaml in the same folder, or loop_closures.yaml there; of a file in a folder
-    `urdf`, also in the folder that holds it, or in `config` there.
+    The file is NAME.loops.yaml or loop_closures.yaml in the same folder. For a robot file in a
+    folder `urdf`, it may also be in the parent folder, or in the folder `config` of that folder.
     """
     from symgen.description.loops_file import EXPORTED, LoopsText  # numpy
 
@@ -263,7 +271,7 @@ def loops_beside(path: Path) -> Any:
     if path.resolve().parent.name == "urdf":
         above = path.resolve().parent.parent
         folders += [above, above / "config"]
-    places = [path.with_suffix(".loops.yaml"), *(folder / EXPORTED for folder in folders)]
+    places = [path.with_suffix(LOOPS_ENDING), *(folder / EXPORTED for folder in folders)]
     found = next((place for place in places if place.is_file()), None)
     return None if found is None else LoopsText(found.name, content_of(found))
 
@@ -281,7 +289,7 @@ def write_robot(
     robot : Robot
         The robot to be written.
     file : str
-        Name of the file, with one of the suffixes WRITTEN.
+        Name of the file, with the suffix .yaml, .yml or .urdf.
     comments : sequence of str
         Comment lines at the top of a robot file (.yaml).
 
@@ -301,7 +309,7 @@ def write_robot(
 
 
 def content_of(path: Path) -> bytes:
-    """Return the content of a robot file as bytes, cut off after MAX_BYTES + 1 bytes.
+    """Return the content of a robot file as bytes, cut off just above the largest allowed size.
 
     Raises DescriptionError if the file cannot be read.
     """
@@ -320,5 +328,5 @@ def content_of(path: Path) -> bytes:
         reason = getattr(error, "strerror", None) or error
         raise DescriptionError(
             f"cannot read {shown}: {reason}; expected a robot file or one of {names}",
-            file=path.name,
+            file=path.name or shown,  # the folder . has no name
         ) from error

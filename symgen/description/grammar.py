@@ -104,7 +104,7 @@ class _Parser:
             return text
         return None
 
-    def guard(self, e: Expression) -> Expression:
+    def limited(self, e: Expression) -> Expression:
         if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
             raise self.error(
                 (
@@ -128,7 +128,7 @@ class _Parser:
             )
         e = self.product()
         while op := self.accept("+", "-"):
-            e = self.guard(e + self.product() if op == "+" else e - self.product())
+            e = self.limited(e + self.product() if op == "+" else e - self.product())
         self.depth -= 1
         return e
 
@@ -139,7 +139,7 @@ class _Parser:
             f = self.unary()
             if op == "/" and not f:
                 raise self.error("division by zero", column)
-            e = self.guard(e * f if op == "*" else e * f.inverse())
+            e = self.limited(e * f if op == "*" else e * f.inverse())
         return e
 
     def unary(self) -> Expression:
@@ -174,7 +174,7 @@ class _Parser:
             for _ in range(
                 abs(n)
             ):  # guarded step by step: nested powers are refused before they grow
-                result = self.guard(result * factor)
+                result = self.limited(result * factor)
             return result
         return base
 
@@ -213,9 +213,9 @@ class _Parser:
                 if self.accept(")") is None:
                     raise self.error("missing )", self.tokens[self.position][2])
                 if text in ("min", "max"):
-                    return self.guard(e)
+                    return self.limited(e)
                 try:
-                    return self.guard(call(text, e))
+                    return self.limited(call(text, e))
                 except (ValueError, ZeroDivisionError) as error:
                     raise self.error(
                         f"cannot evaluate {text}({e}): {error or 'division by zero'}", column
@@ -238,9 +238,9 @@ def parse(
 ) -> Expression:
     """Parse an expression of a robot file, given as text or number, into an exact Expression.
 
-    `symbols` are the declared names (None: any name is allowed). `functions` is FUNCTIONS, or LAWS
-    for the law of a column. Raises ExpressionError, with the column, at the first text that is not
-    allowed.
+    `symbols` are the declared names (None: any name is allowed). `functions` are the allowed
+    functions: `FUNCTIONS`, or `LAWS` for the law of a column. Raises ExpressionError, with the
+    column, at the first text that is not allowed.
     """
     if isinstance(text, (int, float)) and not isinstance(text, bool):
         text = repr(text)

@@ -1,4 +1,5 @@
-"""Loops in a file beside a URDF or MJCF: NAME.loops.yaml, or loop_closures.yaml of an exporter.
+"""Loops of a URDF or MJCF from a second file in its folder: NAME.loops.yaml, or loop_closures.yaml
+of an exporter.
 
 `arm.loops.yaml` belongs to `arm.urdf`:
 
@@ -55,10 +56,10 @@ class LoopsText:
 
 
 def with_loops(tree: Tree, text: LoopsText | None) -> Tree:
-    """Return the tree with the loops, motors and start of a file beside its own.
+    """Return the tree with the loops, motors and start positions of a second file.
 
-    Raises DescriptionError, with file and line, if the file has other keys, or names links or joints
-    that the tree does not have. A loop_closures.yaml of other links is left alone.
+    Raises DescriptionError, with file and line, if the file has other keys, or names links or
+    joints that the tree does not have. A loop_closures.yaml that is about other links is ignored.
     """
     if text is None:
         return tree
@@ -200,9 +201,10 @@ class _Reader:
             yield TreeLoop(name, kind, (links[0], links[1]), (poses[0], poses[1]))
 
     def about(self, poses: list[Array], links: list[str], S: Array, given: bool) -> list[Array]:
-        """Turn z of both frames into an axis S of the first link.
+        """Turn both frames so that their z axes have the direction S of the first link.
 
-        If no orientations are given, the links have at zero the orientation in which the loop closes.
+        If no orientations are given, the loop closes in the orientation that the links have at
+        zero.
         """
         P, Q = poses
         if given:

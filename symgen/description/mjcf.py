@@ -15,10 +15,10 @@ Linear relations of joints and of fixed tendons are solved exactly, for joints t
 drives.
 
 MuJoCo opens no other file. Assets, sensors, contacts, cameras and similar elements are left out. A
-geom that is a mesh becomes a geom without mass if its body has an <inertial> or never moves; a mass
-that only a mesh would give is refused. Elements that stand for many others (replicate, composite,
-flexcomp, attach, plugins) are refused too. Of actuators, only the names of the driven joints are
-read.
+geom that is a mesh becomes a geom without mass if its body has an <inertial> or never moves; a
+model in which only a mesh would give the mass is refused. Elements that stand for many others
+(replicate, composite, flexcomp, attach, plugins) are refused too. Of actuators, only the names of
+the driven joints are read.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Mjcf:
     driven : frozenset of str
         Names of the joints that an actuator drives.
     notes, not_read : tuple of str
-        What was left out without effect on the torques, and with effect.
+        Parts of the file that were left out, without effect on the torques, and with effect.
     """
 
     name: str
@@ -341,7 +341,9 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     mjcf, angles = compiled(content), Angles(exact)
     model = mjcf.model
     if model.njnt > MAX_JOINTS:
-        raise DescriptionError(f"the file has {model.njnt} joints; the limit is {MAX_JOINTS}")
+        raise DescriptionError(
+            f"the file has {model.njnt} joints that move; the limit is {MAX_JOINTS}"
+        )
     for what, values in (
         ("pos of a body", model.body_pos),
         ("mass of a body", model.body_mass),
@@ -588,7 +590,7 @@ def _forces(model: Any) -> list[str]:
 
 
 def _quoted(names: Sequence[str]) -> str:
-    """List at most SHOWN names in quotes."""
+    """List the first few names in quotes."""
     return ", ".join(f"{name!a:.60}" for name in names[:SHOWN])
 
 
@@ -627,8 +629,8 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
 def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
     """Return the expression in joint positions that relation e of the MJCF file sets to zero.
 
-    It is y1 - y1_0 - a0 - a1 (y2 - y2_0), where y is a joint position or the length of a fixed
-    tendon, and y_0 is its value at ref.
+    The expression is y1 - y1_0 - a0 - a1 (y2 - y2_0), where y is a joint position or the length of
+    a fixed tendon, and y_0 is its value at ref.
     """
     kind, name = int(model.eq_type[e]), model.equality(e).name
     a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
@@ -669,9 +671,9 @@ ROUNDED = 1e-3, 1e-9  # m, rad: poses differ by no more if angles were rounded, 
 def _loops(growing: _Growing, tree: Tree, rounded: bool) -> tuple[TreeLoop, ...]:
     """Convert each <connect> and <weld> of an MJCF model to a loop of the tree.
 
-    MuJoCo takes what the file leaves out from the pose at ref: the point of a <connect> in its
-    second body, and the pose of a <weld>. This pose of the tree, whose angles may be rounded, is
-    used in both cases.
+    If the file leaves out the point of a <connect> in its second body, or the pose of a <weld>,
+    MuJoCo takes them from the pose at ref. Here, this pose is computed from the tree, whose angles
+    may be rounded.
     """
     model, pose = growing.mjcf.model, link_poses(tree, tree.start)
     names = {model.equality(e).name for e in range(model.neq)}

@@ -1,4 +1,6 @@
-"""Named places of a robot, of loads and contacts: links of its file, sites, fixed frames."""
+"""Named places of a robot at which loads and contacts may be: links of its file, sites, fixed
+frames.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,8 @@ def mounts(robot: Robot) -> dict[str, tuple[int, Rows]]:
     """Return the places of a robot by name: number of the link, and pose (4, 4) in its frame.
 
     A URDF or MJCF has the links, bodies and sites of its moving bodies, in the order of the file,
-    each with the frame that the file gives it; a base that moves has those of link 0, too. Another
-    robot has its fixed frames, by their labels or as "frame 7".
+    each with the frame that the file gives it; a base that moves also has the places on link 0. The
+    places of any other robot are its fixed frames, named by their labels or as "frame 7".
     """
     if robot.mounts:
         moves = robot.base != "fixed"

@@ -95,9 +95,9 @@ class _Par:
     numbers : mapping
         Tables in the comments, by name: constants, values, start 1, ...
     notes : list of str
-        What was read differently from the file.
+        Sentences on values that were read differently from the file.
     not_read : list of str
-        What was left out and changes the torques.
+        Parts of the file that were left out although they change the torques.
     """
 
     angles: Angles

@@ -307,8 +307,8 @@ def _cofactors(
 ) -> dict[tuple[int, ...], Expression]:
     """Return the coefficients in `e` of given products of joint positions, for instance of q5 q6.
 
-    The result maps the joints of each product to its coefficient: for e = 2 q5 q6, (5, 6) to 2.
-    Raises ValueError if `e` is not a sum of such products.
+    The result maps the joints of each product to its coefficient: for e = 2 q5 q6, the result maps
+    (5, 6) to 2. Raises ValueError if `e` is not a sum of such products.
     """
     cofactors, rest = {}, e
     for joints in products:

@@ -92,7 +92,9 @@ def _frames(rows: Mapping[int, Frame], declared: Declared) -> tuple[Frame, ...]:
 
 
 def _massless(links: list[int], declared: Declared) -> frozenset[int]:
-    """Return the massless links: those the file lists, and end frames added to a classic table."""
+    """Return the massless links: the links that the file lists, and the end frames added to a
+    classic table.
+    """
     return frozenset((*links, *(f.j for f in declared.frames[declared.rows :])))
 
 
@@ -306,7 +308,7 @@ class Robot:
         """Names of the rows of the torques, by key, in their order.
 
         The key of a joint is its number. A free base has six rows before the joints, with the keys
-        of BASE_ROWS.
+        -5 ... 0.
         """
         return (BASE_ROWS if self.base_is_free else {}) | {j: str(j) for j in self.joints}
 
@@ -390,8 +392,8 @@ class Robot:
     def loaded(self) -> tuple[str, ...]:
         """Names of the parameters whose law contains the torque that the joint transmits.
 
-        Load-dependent friction has such a law. A robot with such parameters has no forward
-        dynamics.
+        An example of such a law is load-dependent friction. A robot with such parameters has no
+        forward dynamics.
         """
         read = (own for c, own in self.channels.items() if c.startswith(TRANSMITTED))
         return tuple(name for own in read for name in own)
@@ -416,7 +418,8 @@ class Robot:
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
     """Find the parameters of the element families `families` that act on one joint alone.
 
-    They can be stored as one number per joint. Parameters of one direction of motion are left out.
+    Such parameters can be stored as one number per joint. Parameters of one direction of motion are
+    left out.
     """
     return {
         parameter(e.family, j)

@@ -22,7 +22,7 @@ from symgen.description.expression import Expression
 from symgen.errors import DescriptionError
 
 Array = np.ndarray
-MAX_JOINTS, SHOWN = 200, 20  # of a file; names in a message
+MAX_JOINTS, SHOWN = 200, 20  # that move, of a file; names in a message
 DROPPED = "not read:"  # how the note on elements that are left out starts
 EARTH = 9.81  # m/s^2, along -z of the root link
 HINGE = "hinge"  # kind of a loop: revolute, about the direction of all other hinges around it
@@ -91,7 +91,7 @@ class Joint:
     name : str
         Name in the file.
     kind : str
-        One of MOVING, FIXED_TYPE, or FREE_TYPE; a joint of FREE_TYPE must be held.
+        A kind of moving joint, `FIXED_TYPE`, or `FREE_TYPE`; a free joint must be held.
     parent, child : str
         Names of the links; the frame of `child` is the joint frame at q = 0.
     pose : ndarray, shape (4, 4)
@@ -101,7 +101,7 @@ class Joint:
     line : int
         Line of the file.
     limits : mapping, SI and rad
-        Those of lower, upper, velocity and effort that the file gives.
+        The limits lower, upper, velocity and effort, as far as the file gives them.
     damping, friction, armature, stiffness, rest : float, SI and rad
         Coefficients of the equation above.
     """
@@ -130,8 +130,9 @@ class TreeLoop:
     name : str
         Name in the file.
     kind : str
-        The motion that the loop leaves free: revolute (about z), HINGE, prismatic (along z),
-        spherical (any rotation), or fixed (none).
+        The motion that the loop leaves free: revolute (about z), hinge (about the direction of all
+        other hinges around the loop), prismatic (along z), spherical (any rotation), or fixed
+        (none).
     links : two str
         Names of both links.
     poses : two ndarrays, shape (4, 4)
@@ -159,7 +160,7 @@ class Tree:
     name : str
         Name of the robot.
     links : mapping
-        Inertial of each link by name; None if the file has none.
+        Inertial of each link by name; None if the file gives no inertia.
     joints : tuple of Joint
         One for each link but the root.
     root : str
@@ -172,9 +173,9 @@ class Tree:
     gravity : tuple of float, m/s^2
         Acceleration of gravity in the root link.
     notes : tuple of str
-        What was left out and has no effect on the torques.
+        Parts of the file that were left out, without effect on the torques.
     not_read : tuple of str
-        What was left out and changes the torques.
+        Parts of the file that were left out although they change the torques.
     places : mapping
         For an MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame
         of its link. A URDF has one frame for both.
@@ -189,7 +190,7 @@ class Tree:
     start : mapping, rad or m
         Joint positions, by name, near which the loops are closed; 0 for others.
     motor_line : str
-        What to write for a motor at joint {}, if the file does not say it.
+        Line that the user should write for a motor at joint {}, if the file has no such line.
     floats : bool
         Whether the root is a base that moves.
     """
@@ -304,7 +305,8 @@ def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
     """Find the moving joints outside the chain from link `base` to link `tip`, and the positions at
     which they are held.
 
-    The position is zero, or for a joint that follows others its position when these are at zero.
+    The position is zero; for a joint that follows other joints, it is the position when these are
+    at zero.
     """
     for link in (base, tip):
         if link not in tree.links:

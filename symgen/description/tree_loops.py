@@ -12,11 +12,11 @@ about z (revolute), along z (prismatic), any rotation (spherical) or none (fixed
 - A spherical loop is a point that both links share. If all hinges around the loop are parallel, the
   two links turn about this direction only: the loop has the missing hinge. Otherwise, it becomes
   three hinges without mass, M = Rot(z, a) Rot(x, pi/2) Rot(z, b) Rot(x, pi/2) Rot(z, c), and the
-  last is cut. They are singular where the first and the last axis are parallel, so these axes are
-  those of the hinges of the two links, if these have different directions.
+  last is cut. The three hinges are singular if the first and the last axis are parallel. So these
+  axes are the hinges of the two links, if their directions differ.
 - Two points that the same links share are a hinge, three a fixed loop.
 - A fixed loop (weld) makes one body of both links. The passive joint nearest to one of them is cut
-  in its place, and the links between are turned over: a joint from parent to child, with the pose T
+instead, and the links between are turned over: a joint from parent to child, with the pose T
   and the axis a, leads from child to parent with the axis -a, followed by T^-1.
 
 Joints around a loop are passive, unless the file says that a motor drives them.
@@ -146,8 +146,8 @@ def passive_names(tree: Tree, cuts: tuple[Cut, ...]) -> frozenset[str]:
 def start_of(tree: Tree, cut: Cut) -> dict[str, float]:
     """Return positions of the joints around a loop, by name, near which it is closed.
 
-    They are those of `tree.start`, by default 0. Those of the cut joint, and of turns before it, follow
-    from them, if the loop is closed there.
+    The positions are those of `tree.start`, by default 0. The positions of the cut joint, and of
+    turns before it, follow from these, if the loop is then closed.
     """
     around = [j for j in _around(tree, cut.child, cut.link) if j.kind != FIXED_TYPE]
     names = [j.name for j in around if j.name not in cut.added]
@@ -278,7 +278,7 @@ def _common(axes: list[Array]) -> Array | None:
 def _turns_about(loop: TreeLoop, pose: Mapping[str, Array], axis: Array) -> bool:
     """Whether a loop among hinges parallel to `axis` leaves a rotation about this direction only.
 
-    The direction of a revolute loop may be rounded by ROUNDED.
+    The direction of a revolute loop may be rounded, by a sine of at most 0.001 (`ROUNDED`).
     """
     if loop.kind in ("spherical", HINGE):
         return True
@@ -294,7 +294,7 @@ def _turns_about(loop: TreeLoop, pose: Mapping[str, Array], axis: Array) -> bool
 def _in_the_plane(
     loop: TreeLoop, pose: Mapping[str, Array], axis: Array
 ) -> tuple[Array, Array, tuple[str, ...]]:
-    """Turn z of both frames into the axis of the hinges; take out their distance along this axis."""
+    """Turn z of both frames into the axis of the hinges; remove their distance along this axis."""
     ends = []
     for link, P in zip(loop.links, loop.poses, strict=True):
         T = pose[link]
@@ -332,8 +332,8 @@ def _along(axis: Array) -> Array:
 def _three_turns(tree: Tree, loop: TreeLoop, pose: Mapping[str, Array]) -> tuple[Array, Array]:
     """Choose the directions of the first and the last of three hinges; return both frames.
 
-    They are the axes of the hinges that hold the two links, or perpendicular, if these are nearly
-    parallel.
+    The directions are the axes of the hinges that hold the two links, or perpendicular directions,
+    if these axes are nearly parallel.
     """
     directions = []
     for link, P in zip(loop.links, loop.poses, strict=True):
@@ -355,10 +355,11 @@ def _three_turns(tree: Tree, loop: TreeLoop, pose: Mapping[str, Array]) -> tuple
 
 
 def _of_several_points(tree: Tree) -> Tree:
-    """Make one loop of the points that the same two links share: a hinge of two, a weld of three.
+    """Make one loop of the points that the same two links share: a hinge of two points, a weld of
+    three.
 
-    Among parallel hinges, two points beside each other along the hinges are one, and two others are
-    a weld.
+    Among parallel hinges, two points on one line along the hinges count as one point, and any other
+    two points are a weld.
     """
     pairs: dict[frozenset[str], list[TreeLoop]] = {}
     for loop in tree.loops:

@@ -176,7 +176,7 @@ def _close(table: Table, cut: Cut) -> None:
     if table.tree.floats and not _below(table, j) & _below(table, twin):
         raise DescriptionError(
             f"loop {cut.loop.name!a:.60} closes on the free base, which is read only for loops inside "
-            "one of its limbs; hold the base: symgen convert --lock, with the name of its joint and =0",
+            "one of its limbs; hold the base by symgen convert --lock JOINT=0, with the name of its joint",
             line=cut.loop.line or None,
         )
     start = {number[name]: round(x, START_DIGITS) + 0.0 for name, x in positions.items()}
@@ -210,7 +210,7 @@ def _keep(table: Table, ant: int, pose: Array, *, free: bool = False) -> tuple[i
 def _body(tree: Tree, link: str, pose: Array) -> Body:
     """Collect the links fixed to `link`, and the moving joints mounted on these links.
 
-    `pose` is the pose of `link`; the result has all poses in the same frame.
+    `pose` is the pose of `link`; the result has all poses in that frame.
     """
     body, waiting = Body({link: pose}, []), [link]
     while waiting:
@@ -301,7 +301,7 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
     """Round a row of alternating angles and lengths as the frame table stores them.
 
-    Angles that are multiples of pi/12 are exact; other numbers get DIGITS decimals.
+    Angles that are multiples of pi/12 are exact; other numbers get 13 decimals.
     """
     return tuple(_angle(x)[0] if k % 2 == 0 else round(x, DIGITS) + 0.0 for k, x in enumerate(row))
 
@@ -382,7 +382,7 @@ def read_tree(
     """Return the Robot of a URDF or MJCF file, and notes for the user.
 
     The notes list which joint is which q, which link, body or site is which kept frame, which angle
-    was changed, and what was not read.
+    was changed, and which parts were not read.
 
     Parameters
     ----------
@@ -398,8 +398,8 @@ def read_tree(
     keep_fixed : bool
         Whether links on fixed joints (tool0, flange), bodies without joints, and sites become fixed
         frames (sigma 2) without parameters, for frame_poses and jacobian. Otherwise, such links and
-        bodies are only part of the body that holds them, and sites are left out. Their inertia
-        belongs to that body in both cases.
+        bodies are only a part of the body that holds them, and sites are left out. In both cases,
+        the inertia belongs to that body.
     part : TreePart
         Joints held at a position, and the chain whose joints move.
     loops : LoopsText, optional
@@ -428,8 +428,7 @@ def parse_tree(
 ) -> Tree:
     """Read the links and joints of a URDF or MJCF file; the suffix of `file` selects the format.
 
-    If `sites` is true, the sites of an MJCF become links too. `loops` has loops that a file beside
-    it gives.
+    If `sites` is true, the sites of an MJCF become links too. `loops` has loops from a second file.
     """
     if file.lower().endswith(".urdf"):
         tree = parse_urdf(content, file, exact=exact)
@@ -443,8 +442,8 @@ def robot_of_tree(
 ) -> tuple[Robot, tuple[str, ...]]:
     """Build the Robot of a tree of links and joints, and notes for the user.
 
-    The notes list which joint is which q, which link is which kept frame, and what was not read.
-    Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
+    The notes list which joint is which q, which link is which kept frame, and which parts were not
+    read. Raises DescriptionError, with the line of the wrong joint, if the tree describes no robot.
     """
     table = placed(tree, keep_fixed=keep_fixed)
     tree = table.tree
@@ -552,7 +551,7 @@ def _robot(table: Table, file: str, sha256: str, base: Literal["fixed", "free"])
 def _about_centre(own: Inertial) -> tuple[str, float, tuple[float, ...], Any]:
     """Return name, mass, centre of mass from the origin of the link, and tensor about this centre.
 
-    Both have the axes of the inertial frame of the link.
+    Centre and tensor have the axes of the inertial frame of the link.
     """
     c = own.pose[:3, :3].T @ own.pose[:3, 3]
     return own.name, own.M, tuple(map(float, c)), rows_of(own.I)
@@ -625,8 +624,8 @@ def _keys(
 ) -> list[int]:
     """Find the joints that have a parameter of the family `family`, for instance FV.
 
-    These are all actuated joints, and the joints that follow others if the file gives a value. A
-    spring (family K) needs a value of the file in any case. `value` gives that of a joint.
+    All actuated joints have it, and joints that follow others if the file gives a value. A spring
+    (family K) always needs a value in the file. `value` returns the value of a joint.
     """
     return [
         j for j, joint in table.joint.items() if value(joint) or (j in actuated and family != "K")
@@ -636,7 +635,8 @@ def _keys(
 def _limits(
     table: Table, actuated: list[int]
 ) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
-    """Collect limits of position, speed and torque, each kind only if all actuated joints have it.
+    """Collect limits of position, speed and torque, but each kind of limit only if all actuated
+    joints have it.
 
     A note lists the kinds that are left out.
     """

@@ -4,9 +4,9 @@ Reading. `tree_robot` converts the tree to Khalil frames and adds the values. Nu
 they are; meshes, textures and packages are never opened. A URDF library would load such files, and
 its XML parser would expand entities, which `xml_text` refuses. Every error names its line.
 
-Writing. One link and one joint for each frame; notes list what a URDF cannot store. Joint axes are
-z axes, and link frames are Khalil's. The joint frame is iTj at q_j = 0, as x y z and roll, pitch,
-yaw. Inertials are about the centre of mass c = MS / M:
+Writing. Each frame becomes one link and one joint; notes list the data that a URDF cannot store.
+Joint axes are z axes, and link frames are Khalil's. The joint frame is iTj at q_j = 0, as x y z and
+roll, pitch, yaw. Inertials are about the centre of mass c = MS / M:
 
     I = J - M (c'c 1 - c c')
 """
@@ -105,9 +105,9 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
                     for key, default in (("multiplier", "1"), ("offset", "0"))
                 )
                 mimics[joints[-1].name] = leader, factor * Expression.symbol(leader) + offset
-    if len(joints) > MAX_JOINTS:
+    if (moving := sum(joint.kind != FIXED_TYPE for joint in joints)) > MAX_JOINTS:
         raise DescriptionError(
-            f"the file has {len(joints)} joints; the limit is {MAX_JOINTS}", line=root.line
+            f"the file has {moving} joints that move; the limit is {MAX_JOINTS}", line=root.line
         )
     rotors, unread = _rotors(root)
     joints = [replace(joint, armature=rotors.get(joint.name, 0.0)) for joint in joints]
@@ -178,7 +178,7 @@ def _first_parents(joints: list[Joint], driven: frozenset[str]) -> tuple[list[Jo
     """Divide the joints into one for each child link, which make the tree, and those that close
     loops because their child has a parent already.
 
-    Of two parents of one link, a joint with a motor belongs to the tree.
+    If a link has two parents, the joint with a motor belongs to the tree.
     """
     first: dict[str, Joint] = {}
     for joint in joints:
@@ -269,7 +269,9 @@ def _loop(e: XmlElement, angles: Angles) -> TreeLoop:
 
 
 def _sdf_loop(e: XmlElement, tree: Tree, angles: Angles) -> TreeLoop:
-    """Read a joint of SDF: its <pose> is in the child, and both links are placed as at zero."""
+    """Read a joint of SDF: its <pose> is given in the child, and both links have their poses at
+    zero.
+    """
     name, ends = e.attrib.get("name", "loop"), []
     for tag in ("parent", "child"):
         end = e.find(tag)
@@ -305,7 +307,9 @@ def _placed(e: XmlElement, what: str, angles: Angles) -> Array:
 def _loop_about(
     e: XmlElement, name: str, links: tuple[str, str], poses: list[Array], axis: Array | None
 ) -> TreeLoop:
-    """Make a loop whose free motion is about or along `axis`, in both frames; None if not given."""
+    """Make a loop whose free motion is about or along `axis`, in both frames; return None if no
+    axis is given.
+    """
     kind = _LOOP_KINDS[e.word("type")]
     if kind in ("revolute", "prismatic") and axis is None:
         kind = HINGE if kind == "revolute" else kind
@@ -353,9 +357,10 @@ def _left_out(root: XmlElement) -> Iterator[str]:
 
 
 def _not_read(root: XmlElement) -> Iterator[str]:
-    """Yield what is not read and changes the torques, such as a constraint that closes a loop.
+    """Yield the parts of the file that are not read although they change the torques, such as a
+    constraint that closes a loop.
 
-    In <gazebo>, these are a <joint> between two links, a switch of gravity, and a spring.
+    In <gazebo>, such parts are a <joint> between two links, a switch of gravity, and a spring.
     """
     for e in (root, *root):
         known = READ.get(e.tag, set()) | HARMLESS.get(e.tag, set())
@@ -379,7 +384,8 @@ def _named(e: XmlElement, where: str = "") -> str:
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
-    """Express the position of each mimic joint by that of the joint at the end of its mimic chain.
+    """Express the position of each mimic joint by the position of the joint at the end of its mimic
+    chain.
 
         q = multiplier q_leader + offset
 
@@ -527,7 +533,7 @@ _DYNAMICS = {"FV": "damping", "FS": "friction"}
 def write_urdf(
     robot: Robot, values: Mapping[str, float] | None = None
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the URDF text of `robot`, and notes on what a URDF cannot store.
+    """Return the URDF text of `robot`, and notes on the data that a URDF cannot store.
 
     Parameters
     ----------
@@ -535,7 +541,7 @@ def write_urdf(
         A robot without loops; each passive joint follows one joint.
     values : mapping, SI, optional
         Standard parameters by name; by default, those of the robot file. A URDF holds masses, so
-        the values must be those of a physical robot: of a feasible estimate, or from CAD.
+        that the values must be those of a physical robot, from a feasible estimate or from CAD.
 
     Raises
     ------

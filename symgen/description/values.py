@@ -77,7 +77,7 @@ def round_angle(e: Expression) -> Expression:
 def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
     """Replace the symbols of the expression `e` by the expressions in `values`.
 
-    Raises DescriptionError if `e` has no finite real value there.
+    Raises DescriptionError if `e` has no finite real value at these values.
     """
     try:
         return e.substitute(values)
@@ -117,7 +117,9 @@ def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
 
 
 def _with(item: Item, **fields: Any) -> Item:
-    """Return the item with these fields: itself if it has them, else a copy, which is checked."""
+    """Return the item with these fields: the item itself if it has them already, else a checked
+    copy.
+    """
     same = all(getattr(item, name) == value for name, value in fields.items())
     return item if same else replace(item, **fields)
 

@@ -17,13 +17,14 @@ import numpy as np
 from symgen.errors import DescriptionError
 
 Array = np.ndarray
+EXPAND = "this file is a xacro macro; expand it first (xacro FILE > robot.urdf)"
 MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
 class XmlElement(ElementTree.Element):
     """An element of an XML file, with the line and the byte at which it starts.
 
-    `content` is the text between its tags, without that of its children.
+    `content` is the text between its tags, without the text of its children.
     """
 
     def __init__(self, tag: str, attributes: dict[str, str], line: int, byte: int) -> None:
@@ -37,7 +38,9 @@ class XmlElement(ElementTree.Element):
         def find(self, path: str, namespaces: Any = None) -> XmlElement | None: ...
 
     def own(self, *tags: str) -> Iterator[XmlElement]:
-        """Yield the child elements with the given tags, also inside <frame> elements of an MJCF."""
+        """Yield the child elements with the given tags, including those inside <frame> elements of
+        an MJCF.
+        """
         for child in self:
             if child.tag in tags:
                 yield child
@@ -67,8 +70,11 @@ class XmlElement(ElementTree.Element):
         except ValueError:
             values = []
         if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
+            remedy = (
+                f"; {EXPAND}" if "$" in text else "; put blanks in place of commas" * ("," in text)
+            )
             raise DescriptionError(
-                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of magnitude at most {largest:g}",
+                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of magnitude at most {largest:g}{remedy}",
                 line=self.line,
             )
         return np.array(values)
@@ -81,7 +87,7 @@ class XmlElement(ElementTree.Element):
 def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
     """Parse an XML file and return its root element.
 
-    DescriptionError names the line if the file is not plain XML.
+    Raise DescriptionError, with the line, if the file is not plain XML.
     """
     if len(content) > MAX_BYTES:
         raise DescriptionError(
@@ -102,7 +108,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
             )
         if tag.startswith("xacro:"):
             raise DescriptionError(
-                f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)",
+                f"<{tag}>: {EXPAND}",
                 line=line,
             )
         open_.append(XmlElement(tag, attributes, line, parser.CurrentByteIndex))

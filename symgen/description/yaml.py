@@ -3,8 +3,9 @@
 A text is read as plain data with line numbers and then converted to a checked Robot. A written text
 is read as the same Robot. Only mappings, lists and scalars of the core schema are read. Tags,
 anchors and aliases, merge keys, repeated keys, second documents and non-finite numbers are refused,
-so that a file means what it shows. Whatever the bytes are, the only exception that `parse_robot`
-raises is DescriptionError, with file and line; its message names the wrong field.
+so that a reader of the file sees everything that it means. Whatever the bytes are, the only
+exception that `parse_robot` raises is DescriptionError, with file and line; its message names the
+wrong field.
 """
 
 from __future__ import annotations
@@ -148,7 +149,7 @@ def document(content: bytes, lines: dict[Path, int]) -> Any:
         )
         advice = next((f"; {text}" for part, text in _YAML_ADVICE.items() if part in problem), "")
         raise DescriptionError(
-            f"not YAML: {problem}{advice}", line=mark.line + 1 if mark else None
+            f"the text is not YAML: {problem}{advice}", line=mark.line + 1 if mark else None
         ) from error
     except RecursionError as error:
         raise DescriptionError(
@@ -156,7 +157,7 @@ def document(content: bytes, lines: dict[Path, int]) -> Any:
         ) from error
     except Exception as error:  # on malformed text the scanner raises IndexError and others too
         first = (str(error) or type(error).__name__).splitlines()[0]
-        raise DescriptionError(f"not YAML: {first}") from error
+        raise DescriptionError(f"the text is not YAML: {first}") from error
 
 
 def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any:
@@ -442,7 +443,7 @@ def tables_of(robot: Robot) -> dict[str, Any]:
 
 
 def data_of(robot: Robot) -> dict[str, Any]:
-    """Return the data of a robot file that describes `robot`, of which `described` makes it again."""
+    """Return the data of a robot file from which `described` makes `robot` again."""
     data: dict[str, Any] = document(write_yaml(robot).encode(), {})
     return data
 

@@ -1,6 +1,6 @@
 """Functions of a robot, such as its inverse dynamics, as source text in any language.
 
-For each function: its arguments, its lines, and the entries of its result.
+The text of a function consists of its arguments, its lines, and the entries of its result.
 """
 
 from __future__ import annotations

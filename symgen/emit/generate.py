@@ -78,7 +78,7 @@ def generate_files(
     robot : Robot
         The robot.
     targets : sequence of str
-        Names among TARGETS. A target that cannot serve the robot is left out.
+        Names of targets, such as python and c. A target that cannot serve the robot is left out.
     command : str, optional
         Argument of `symgen generate` that the header of the files shows. Default: the file of the
         robot.

@@ -112,7 +112,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
 
 
 def _base_text(robot: Robot) -> str:
-    """Say in the header what a base that moves is."""
+    """Explain in the header how a moving base is described."""
     text = "moves; gravity is a part of its measured acceleration a0"
     if not robot.base_is_free:
         return text

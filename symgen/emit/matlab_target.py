@@ -1,10 +1,10 @@
 """The MATLAB files of a robot: one function file for each model, also for Octave.
 
 States stand in rows, q (N, n), and every line computes all N samples. Constants of the robot file
-are a row, too, or one row for each sample. A result has the samples first: D (N, n, b), so that
+are one row, or one row for each sample. A result has the samples first: D (N, n, b), so that
 reshape(D, [], b) is the observation matrix W with rows joint-major.
 
-The texts keep to the language that MATLAB and Octave share.
+The texts use only the language that MATLAB and Octave share.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ class _Robot:
     ) -> File:
         """Make a file: its help text, the checks of its arguments, its constants, its sections.
 
-        `used` are the constants that its lines read.
+        `used` lists the constants that its lines read.
         """
         function, states = f"{self.robot.name}_{name}", [x for x in arguments if x in STATES]
         varying = bool(states)  # from sample to sample
@@ -418,7 +418,9 @@ class _Robot:
         return self._named(MATLAB.expression(e))
 
     def _named(self, text: str) -> str:
-        """Replace names of the robot file that are words of the language; not those of functions."""
+        """Replace names of the robot file that are words of the language, except names of
+        functions.
+        """
         return re.sub(r"\b[A-Za-z]\w*\b(?!\()", lambda name: self.names.of_file(name[0]), text)
 
 
@@ -448,7 +450,7 @@ def _wrapped(text: str) -> list[str]:
 def _narrowed(lines: Iterable[str]) -> list[str]:
     """Move the ends of lines that are too long for a comment to the start of the next line.
 
-    A line that is indented further than the first of its text goes on with that text.
+    A line that is indented further than the first line of its text continues this text.
     """
     made: list[str] = []
     rest, first = "", 0

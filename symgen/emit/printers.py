@@ -54,7 +54,7 @@ class Language(NamedTuple):
     breaks : bool
         Whether a line may be broken at every space, or only within brackets.
     continues : str
-        Text at the end of a line of code that goes on in the next line.
+        Text at the end of a line of code that continues in the next line.
     step, entry : str
         Line that gives a name to a value, and line that assigns a value to an entry of a result; {}
         stands for the name, then for the value.
@@ -85,7 +85,7 @@ class Language(NamedTuple):
 
     def expression(self, e: object) -> str:
         """Write an expression of constants, a linear expression of joint positions, or a formula of
-        parameters as code: its text in the grammar of robot files.
+        parameters as code. The text of the expression follows the grammar of robot files.
         """
         text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
         text = re.sub(r"\bpi\b", self.pi, text)
@@ -222,7 +222,7 @@ class Text:
         """Find, for each graph node, the named quantity that is computed from it, such as N16 for
         node N16a.
 
-        This is the first named quantity that uses the node, or else the first output. An unnamed
+        The quantity is the first named one that uses the node, or else the first output. An unnamed
         node gets a name from it.
         """
         whole: dict[int, str] = {}

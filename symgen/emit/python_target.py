@@ -2,8 +2,8 @@
 
 Each function is written as a block of plain expressions over a namespace `xp`. The block fills a
 container by index: an array of NumPy, or a table that later becomes an array of another package or
-a matrix of CasADi. The steps that functions share, the motion of the links, are a block of their
-own.
+a matrix of CasADi. The steps that several functions share (the motion of the links) are a block of
+their own.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], tuple[Section, ...]]:
 
 
 def _laid_out(spec: ModuleSpec, block: Block, indent: int = 4) -> dict[str, object]:
-    """Collect the lines of one function for the template, which indents them by so many columns."""
+    """Collect the lines of one function for the template, which indents them."""
     f = block.function
     results = block.results(lambda place: _entry(block.result, place))
     constant = [] if f.model.by_columns else _constant_entries(f, block.result)
@@ -185,8 +185,8 @@ def _entry(result: str, place: Sequence[int]) -> str:
 
 
 def _passed_constants(robot: Robot, names: Sequence[str]) -> str:
-    """Write the constants that a call passes on: one tuple, and a second for those that vary with
-    time.
+    """Write the constants that a call passes on: one tuple, and a second tuple for constants that
+    vary with time.
     """
     timed = [c for c in names if c in robot.channels]
     rest = tuple_of([c for c in names if c not in timed])
@@ -293,8 +293,8 @@ def _unpack(source: str, used: Sequence[tuple[int, str]], count: int) -> list[st
     """Write the lines that give names to the used entries of an array, such as `q1, q2 = q`.
 
     `used` holds index and name of each used entry, `count` is the length of the array. Adjacent
-    entries are unpacked from one slice, others one by one. If many entries are used, the whole
-    array is unpacked.
+    entries are unpacked from one slice, other entries one by one. If many entries are used, the
+    whole array is unpacked.
     """
     if len(used) > MANY and used[-1][0] - used[0][0] >= len(used):
         called = dict(used)

@@ -81,10 +81,11 @@ def lines_that_fit(lines: Iterable[str], language: Language) -> Iterator[str]:
 
 
 def _fitted(line: str, more: str, words: bool, free: bool, continues: str) -> Iterator[str]:
-    """Yield the parts of a line; all but the first start with `more`, all but the last end with
-    `continues`.
+    """Yield the parts of a line; all parts but the first start with `more`, all but the last end
+    with `continues`.
 
-    `words` says whether the line is a comment, `free` whether it may be broken outside brackets.
+    `words` : whether the line is a comment. `free` : whether the line may be broken outside
+    brackets.
     """
     while len(line) > WIDTH and (end := _end(line, more, words, free, WIDTH - len(continues))):
         yield line[:end].rstrip() + continues
@@ -96,7 +97,7 @@ def _end(line: str, more: str, words: bool, free: bool, width: int) -> int:
     """Find the column at which to break a line: its last suitable space within `width` columns.
 
     A space outside inner brackets is better, if it leaves no short line. Spaces inside strings do
-    not count, in a comment all do. The result is 0 without such a space.
+    not count; in a comment, all spaces count. The result is 0 if there is no such space.
     """
     start = len(more) if line.startswith(more) else len(line) - len(line.lstrip())
     depth, quote = 0, ""

@@ -1,8 +1,8 @@
 """The models of a robot as data, before a printer writes them as source code.
 
-For each model: its entries as nodes of an expression graph, the states and parameters that they
-depend on, its constant entries, and its number of operations. The data are made once; every target
-prints them.
+The data of a model are its entries as nodes of an expression graph, the states and parameters that
+they depend on, its constant entries, and its number of operations. The data are made once, and
+every target prints them.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class ModuleSpec:
         """Table structure[k][i]: whether base parameter k can affect the torque with index i: of a
         joint, or of a row of a free base.
 
-        It can act if the entry of the regressor D is not identically zero.
+        The parameter can affect the torque if the entry of the regressor D is not identically zero.
         """
         b, n = self.functions["regressor"].shape
         acts = {place for place, e in self.functions["regressor"].by_place if e.value != 0}
@@ -133,7 +133,9 @@ class ModuleSpec:
 
     @cached_property
     def base_values(self) -> tuple[float, ...]:
-        """Base parameters X of the values in the robot file; empty if it lacks one they contain."""
+        """Base parameters X of the values in the robot file; empty if the file lacks a value that
+        they contain.
+        """
         values, constants = self.robot.values, self.robot.constants
         rows = [b.combination for b in self.regrouping.base]
         if not {name for row in rows for name in row} <= {*values}:
@@ -197,10 +199,11 @@ def function(
 ) -> Function:
     """Make the description of one emitted function: its model, its expressions and its shape.
 
-    `name` is the model, such as inverse_dynamics. Only base parameters named after a standard parameter for which `only` is true take part.
-    `graph` is an expression graph that several models share; it needs all parameters. A model on
-    request adds nodes to its derivation, so it has one of its own: its operations do not depend on
-    what was asked before.
+    `name` is the model, such as inverse_dynamics. Only base parameters named after a standard
+    parameter for which `only` is true take part. `graph` is an expression graph that several models
+    share; it needs all parameters. A model on request adds nodes to its derivation, so that it has
+    a derivation of its own: the operations of the other models then do not depend on earlier
+    requests.
     """
     robot, request = regrouping.robot, _request(regrouping, only)
     model = MODELS[name].on(robot)

@@ -15,7 +15,7 @@ class Target(NamedTuple):
     Attributes
     ----------
     file : str
-        Name of the file; {} stands for the name of the robot. Where each function has a file of its
+        Name of the file; {} stands for the name of the robot. If each function has a file of its
         own, a second {} stands for the function.
     language : str
         Language of the file, or the arrays for which it is written.
@@ -27,8 +27,8 @@ class Target(NamedTuple):
     bases : tuple of str
         Kinds of base (`Robot.base`) whose models the file can have.
     values : str
-        Name of X of the robot file in the file, which lacks it without these values, if no other
-        function of the file computes X; {} stands for the name of the robot.
+        Name of the array of base parameters in the file; "" if the file computes them by a function.
+        The array needs the values of the robot file. {} stands for the name of the robot.
     """
 
     file: str

@@ -19,8 +19,8 @@ from symgen.description.robot import INERTIAL, Robot, parameter
 def boxes(robot: Robot) -> list[dict[str, Any]]:
     """List the boxes of the links whose ten parameters the robot file gives, if bodies can have them.
 
-    Each has `link`; `centre`, m, and `axes`, three unit vectors, in the frame of the link; `sides`,
-    m.
+    Each box has the entries `link`; `centre`, m, and `axes`, three unit vectors, both in the frame
+    of the link; and `sides`, m.
     """
     found = []
     for j in robot.links:

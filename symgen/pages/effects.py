@@ -1,7 +1,7 @@
 """Explain the effect of each standard parameter on the base parameters and joint torques.
 
-A parameter acts through its energy, E + U of its link if only this parameter were 1 (Gautier and
-Khalil, IEEE T-RA 6(3), 1990):
+A parameter acts through its energy, which is E + U of its link if this parameter is 1 and all
+others are 0 (Gautier and Khalil, IEEE T-RA 6(3), 1990):
 
     XX w1**2/2   XY w1 w2   XZ w1 w3   YY w2**2/2   YZ w2 w3   ZZ w3**2/2
     MX w3 v2 - w2 v3 - g1   MY w1 v3 - w3 v1 - g2   MZ w2 v1 - w1 v2 - g3   M v.v/2 - g.P
@@ -43,7 +43,7 @@ class Effect:
     joints : tuple of int or str
         Joints whose torques depend on these base parameters; rows of a free base by name.
     why : str
-        Reason why the parameter has no effect; "" if it has one.
+        Reason why the parameter has no effect; "" if it has an effect.
     """
 
     name: str
@@ -121,7 +121,7 @@ def inertial_meaning(family: str, j: int) -> str:
 class Reasons:
     """Reasons why standard parameters of one robot have no effect on the joint torques.
 
-    They come from components of motion and gravity that are zero in every motion of a link.
+    The reasons are components of motion and gravity that are zero in every motion of a link.
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -134,7 +134,7 @@ def recursive_formulas(regrouping: Regrouping) -> list[tuple[str, Formula]]:
 def operations(regrouping: Regrouping) -> dict[str, dict[str, int]]:
     """Count multiplications and additions per sample of the emitted regressor and inverse dynamics.
 
-    The counts are for all base parameters, and for the inertial ones (and Ia) alone.
+    The counts are for all base parameters, and for the inertial parameters (and Ia) alone.
     """
     robot = regrouping.robot
     counted = {

@@ -197,7 +197,8 @@ def printed(text: str) -> str:
 
 
 def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
-    """Group the standard parameters by link or joint, and mark each: alone, regrouped or none.
+    """Group the standard parameters by link or joint, and mark each parameter as alone, regrouped
+    or none.
 
     The mark none means that the parameter has no effect.
     """
@@ -225,7 +226,9 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
 def _pointed_at(
     spec: ModuleSpec, parameters: Sequence[Effect], absorbed: Sequence[Absorption]
 ) -> Mapping[str, Any]:
-    """Collect, for each parameter, what the page shows when the pointer is on this parameter."""
+    """Collect, for each parameter, the text that the page shows when the pointer is on this
+    parameter.
+    """
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
     entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}
@@ -270,8 +273,8 @@ def _template() -> Template:
 def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
     """Collect the data of the robot drawing as plain values for JSON, in SI units and rad.
 
-    `theta` and `r` are without the joint position. `follows` gives each passive joint as
-    q_j = offset + sum_i of_i q_i.
+    `theta` and `r` do not contain the joint position. `follows` gives each passive joint as q_j =
+    offset + sum_i of_i q_i.
     """
     follows = {
         j: {

@@ -106,8 +106,8 @@ def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
 def small_rational(x: int, p: int, bound: int = 30) -> Fraction | None:
     """Find the fraction a/b with |a|, b <= bound that equals x mod p, by Wang's reconstruction.
 
-    Return None if there is no such fraction. Of random residues of 31 bits, one in two million is
-    such a fraction up to 30, one in two thousand up to 1000.
+    Return None if there is no such fraction. A random residue of 31 bits is such a fraction with a
+    probability of one in two million for the bound 30, and one in two thousand for the bound 1000.
     """
     r0, r1, t0, t1 = p, x % p, 0, 1
     while r1 > bound:

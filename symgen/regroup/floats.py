@@ -1,6 +1,6 @@
 """Base columns of the regressor and their regrouping coefficients, computed in floating point.
 
-They hold for the constants of the robot file. They are used for coefficients that are not
+The coefficients hold for the constants of the robot file. They are used for relations that are not
 recognised modulo primes, and for loops that cannot be closed exactly modulo a prime, such as
 spatial loops. Dependent columns are found at random states, which Newton's method closes near the
 start configuration of the loops.
@@ -190,7 +190,7 @@ def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
 
 def float_base(W: Array) -> tuple[list[int], Array]:
     """Find the independent columns of a matrix W, leftmost first, and write all columns of W as
-    combinations of these.
+    combinations of the independent columns.
 
     Return the indices of the independent columns, and the coefficients, shape (rank, columns).
     """
@@ -214,8 +214,8 @@ def float_base(W: Array) -> tuple[list[int], Array]:
 
 
 def _without_negligible(U: Array, pivots: list[int]) -> Array:
-    """Write all columns of U, shape (rows, columns), as combinations of those in `pivots`, without
-    coefficients that are only rounding.
+    """Write all columns of U, shape (rows, columns), as combinations of the columns `pivots`,
+    without coefficients that are only rounding errors.
 
     Return the coefficients, shape (pivots, columns).
     """

@@ -90,7 +90,8 @@ class BaseDifference:
 
 
 def absorptions(robot: str | pathlib.Path | Robot | Regrouping) -> tuple[Absorption, ...]:
-    """Explain why each standard parameter is part of a base parameter named after another one.
+    """Explain why each standard parameter is part of a base parameter named after another
+    parameter.
 
     The reasons are in the order of eq. (4).
 

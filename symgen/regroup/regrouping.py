@@ -5,8 +5,8 @@ parameters then follow from the echelon form over the finite field F_p, with the
 order of preference. The few dependent columns that remain are expressed by relations of this robot
 alone, solved exactly. A certificate checks the result.
 
-The coefficients stay expressions until they are written: as text here, in Python by
-`emit.printers`, by the printers of SymPy in `symbols`.
+The coefficients stay expressions until they are written: as text by this module, in Python by
+`emit.printers`, and by the printers of SymPy in `symbols`.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ class Regrouping:
         The recursive form: each step removes the standard parameter `from` and adds coefficient *
         `from` to the parameter `into`.
     method : str
-        How the coefficients were derived: EXACT, or NUMERIC and the reason.
+        How the coefficients were derived: the text `EXACT`, or the text `NUMERIC` and the reason.
     """
 
     robot: Robot
@@ -225,14 +225,15 @@ def regroup(robot: str | Path | Robot, *, seed: int = 1) -> Regrouping:
 
 
 def regrouping_of(robot: str | Path | Robot | Regrouping) -> Regrouping:
-    """Return a regrouping as it is, or that of a robot; the robot as for `regroup`."""
+    """Return a Regrouping as it is, or derive that of a robot, given as for `regroup`."""
     return robot if isinstance(robot, Regrouping) else regroup(robot)
 
 
 def _warn(regrouping: Regrouping) -> None:
     """Warn of each link whose inertia no rigid body can have, and name its base parameters.
 
-    The warning names this line, wherever `regroup` was called: Python shows a warning once per line.
+    Every call warns from one line of this function, because Python shows a warning only once per
+    line.
     """
     advice = (
         "Give the moments about the centre of mass in kg m^2, from CAD or of a box, or identify the moments"

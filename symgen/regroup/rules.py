@@ -79,7 +79,7 @@ class Transfer:
         """Express the regressor column of an inertial parameter in frame j by columns of link parameters.
 
         A frame that is fixed to a link but is no link itself is replaced by that link. Parameters
-        of the base have no columns, unless it is free.
+        of the base have no columns, unless the base is free.
         """
         if j == 0 and not self.robot.base_is_free:
             return {}
@@ -144,7 +144,7 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
 def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
     """Compute the matrix (p.u) E - p u' of the parallel-axis rule, from vectors p and u.
 
-    If `symmetric`, it is 2 (p.u) E - p u' - u p'. E is the identity.
+    If `symmetric`, the matrix is 2 (p.u) E - p u' - u p'. E is the identity.
     """
     trace = (p[0] * u[0] + p[1] * u[1] + p[2] * u[2]) * (1 + symmetric)
     return [

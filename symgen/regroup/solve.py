@@ -1,8 +1,8 @@
 """Exact coefficients of dependent regressor columns: D_dependent = sum_k beta_k D_base,k.
 
-Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of
-fixed angles. The program changes one of these variables at a time to find which of them matter. The
-rest is linear algebra: beta = P/Q with P, Q polynomials of rising degree in these variables,
+Over F_p, each beta is a residue that depends on the geometry: on lengths, gravity, and (cos, sin)
+of fixed angles. The program changes one of these variables at a time to find which of them matter.
+The rest is linear algebra: beta = P/Q with P, Q polynomials of rising degree in these variables,
 
     sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0
 
@@ -98,8 +98,8 @@ def coefficients(
 class Pool:
     """Coefficients of dependent regressor columns, modulo a prime, at a set of random geometries.
 
-    `k` is the number of the prime. `free` names what may vary besides the constants: "numbers" of
-    the robot file, "pi" (fractions of pi), or both.
+    `k` is the number of the prime. `free` names the quantities that may vary besides the constants:
+    "numbers" of the robot file, "pi" (fractions of pi), or both.
     """
 
     def __init__(self, robot: Robot, supports: Supports, free: Sequence[str], k: int) -> None:
@@ -213,7 +213,7 @@ class Dependence:
 class Recognition:
     """Search for exact expressions of regrouping coefficients, from their values modulo primes.
 
-    `free` names what counts as a variable besides the constants, see `Pool`.
+    `free` names the variables besides the constants, see `Pool`.
     """
 
     def __init__(
@@ -287,7 +287,8 @@ class Recognition:
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
         """Find the power n with which a coefficient scales with one variable; 0 if there is none.
 
-        `scaled` holds the coefficient modulo p with the variable multiplied by each of SCALES.
+        `scaled` holds the coefficient modulo p with the variable multiplied by each factor in
+        `SCALES`.
         """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
@@ -371,9 +372,9 @@ class Recognition:
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
         """List the sets of fixed angles whose cosines and sines may occur in a coefficient.
 
-        A set has one angle, two angles, or all. It must contain every unit angle that matters; a
-        fixed angle is a sum of multiples of unit angles. Without such angles, the only set is
-        empty.
+        A set has one angle, two angles, or all angles. It must contain every unit angle that
+        matters; a fixed angle is a sum of multiples of unit angles. Without such angles, the only
+        set is empty.
         """
         units, written = {v for v in matters if isinstance(v, tuple)}, numbered(self.robot)
         every = units_of(written)

@@ -1,12 +1,12 @@
-"""Random states of a robot, with the regressor columns there, computed exactly modulo a prime p.
+"""Random states of a robot, with their regressor columns, computed exactly modulo a prime p.
 
 Without loops, or if all joint relations are linear, states are drawn freely (`derive.exact`). In
-general loops the tied joints are algebraic functions of the actuated ones. The method serves loops
+general loops, the tied joints are algebraic functions of the actuated joints. The method serves loops
 whose orientations agree by construction (sums of angles), so that the closure equations r = 0 are
 equations of positions. Lengths and actuated joints are drawn at random, and each loop is closed by
 two tied joints. r is linear in (cos v, sin v) of a hinge v, so that cos(v)**2 + sin(v)**2 = 1 gives
 a quadratic equation for the other joint u. Its roots lie in F_p, the field of integers modulo p,
-for every other draw. These are points of
+for every other draw. The solutions are points of
 
     V = {(lengths, configuration) : r = 0} ,
 
@@ -273,8 +273,8 @@ class ClosedDraw(Draw):
         self.samples = len(places)
 
     def _move(self) -> None:
-        """Compute velocities and accelerations of the dependent joints from those of the actuated
-        joints, modulo p.
+        """Compute velocities and accelerations of the dependent joints from the motion of the
+        actuated joints, modulo p.
         """
         joints = self.robot.joints
         n = len(joints)
@@ -375,8 +375,8 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
 def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
     """Return how many random states are enough to show the rank of the regressor columns `names`.
 
-    The columns that act only on the joints of a set S need |columns| <= states |S|. This is
-    required for the set of every column, and for all joints. At least `spare` states are added.
+    The columns that act only on the joints of a set S need |columns| <= states |S|. The condition
+    is required for the set of every column, and for all joints. At least `spare` states are added.
     """
     acting = _acting(robot)
     acts = np.stack([acting[name] for name in names])

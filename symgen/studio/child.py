@@ -50,7 +50,7 @@ def limited(seconds: int = 10**9) -> None:
 
 
 class ViewProcess:
-    """A child process that computes the data that pages show (views); restarted if it was ended."""
+    """A child process that computes the data of pages (views), and is restarted if it was ended."""
 
     def __init__(self) -> None:
         self.pool: ProcessPoolExecutor | None = None

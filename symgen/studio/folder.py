@@ -1,17 +1,18 @@
 """The work folder of the studio: ordinary files, whose names never come from the browser.
 
     robot.urdf, .xml, .par    the user's own file
-    robot.yaml                the table of frames, after an edit; it then is the robot
+    robot.loops.yaml          the loops of a URDF or MJCF, as they stood beside it
+    robot.yaml                the table of frames after an edit or with these loops, which then describes the robot
     robot.draft.yaml          an edit that does not describe a robot yet
-    record/run.csv, validation/other.csv    measured files, with the names that they came with
+    record/run.csv, validation/other.csv    measured files, with their original names
     study.yaml                meaning of the record, and settings of its evaluation
     proof.json, check.json    the certificate and the findings
-    repair.json               what the last repair has changed in the study, and the study before
-    times.json                how long the last run of each kind took, s
+    repair.json               changes of the study by the last repair, and the study before it
+    times.json                duration of the last run of each kind, s
     robot-NN-name.urdf, study-NN-name.yaml, runs/NN-name/    robot, settings, results of one command
-    history/robot/NNNN/, history/study/NNNN/, history/record/NNNN/    what a change has replaced
-    history/undone/NNNN/      robots that undo has replaced
-    .address.json             port and token of the server, which only the owner reads
+    history/robot/NNNN/, history/study/NNNN/, history/record/NNNN/    versions that a change has replaced
+    history/undone/NNNN/      robots that an undo has replaced
+    .address.json             port and token of the server, which only the owner can read
 
 In a history, the newest folder has the largest number NNNN.
 """
@@ -36,10 +37,18 @@ from runtime.reading.formats import file_extensions, is_measured
 from runtime.reporting.result_files import write_all
 from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
-from symgen.description.files import content_of, load_robot
+from symgen.description.files import (
+    TREES,
+    content_of,
+    is_loops_file,
+    load_robot,
+    loops_beside,
+    write_robot,
+)
 
 ROBOT_ENDINGS = (".yaml", ".urdf", ".xml", ".par")  # the first one that is there is the robot
 OTHER_ENDINGS = {".yml": ".yaml", ".mjcf": ".xml"}
+LOOPS = "robot.loops.yaml"
 DRAFT = "robot.draft.yaml"
 MOST_KEPT = 300  # robots and studies before the present one
 RECORDS_KEPT = 3  # before the present one
@@ -77,16 +86,17 @@ class WorkFolder:
         return self.first(ROBOT_ENDINGS)
 
     def first(self, endings: tuple[str, ...]) -> Path | None:
-        """Return the first existing robot file with one of the given endings; None if none exists.
+        """Return the first existing robot file with one of the given endings; None if there is no
+        such file.
 
-        With the endings of TREES, it is the user's own file.
+        A URDF or MJCF file is the user's own file.
         """
         found = (self.path / f"robot{ending}" for ending in endings)
         return next((path for path in found if path.is_file()), None)
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the robot file, or of its draft; "" without a robot."""
+        """SHA-256 of the robot file, or of its draft; "" if there is no robot."""
         path = self.path / DRAFT if self.read(DRAFT) else self.robot
         return sha256(path.read_bytes()).hexdigest() if path else ""
 
@@ -109,7 +119,7 @@ class WorkFolder:
     def bring_back(self, history: str = "robot", other: str = "undone") -> None:
         """Replace the present robot by the last robot of a history, for undo and redo.
 
-        The present robot is added to the history `other`. InputError if the history is empty.
+        The present robot is added to the history `other`. Raise InputError if the history is empty.
         """
         if not (before := self.kept(history)):
             raise InputError("nothing to undo; reload the page")
@@ -120,7 +130,7 @@ class WorkFolder:
         remove(before[-1])
 
     def _remove_robot(self) -> None:
-        for name in (DRAFT, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
+        for name in (DRAFT, LOOPS, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
             (self.path / name).unlink(missing_ok=True)
 
     def take_robot(self, name: str, content: bytes) -> None:
@@ -132,6 +142,15 @@ class WorkFolder:
         self._remove_robot()
         self.write(robot_file(name), content)
 
+    def take_loops(self, content: bytes, table: str) -> None:
+        """Use the content of a file with loops beside the user's own URDF or MJCF.
+
+        table : text of the robot file (.yaml) of both.
+        """
+        self._keep_robot()
+        (self.path / DRAFT).unlink(missing_ok=True)
+        write_all(self.path, {LOOPS: content, "robot.yaml": table})
+
     def _keep_robot(self) -> None:
         self.keep("robot")
         remove(self.path / "history" / "undone")
@@ -139,15 +158,17 @@ class WorkFolder:
     def take_robot_of(self, source: str) -> None:
         """Use a packaged robot or a robot file as the new robot.
 
-        source : name or path from the command line. SymgenError if it is no robot.
+        source : name or path from the command line. Raise SymgenError if it describes no robot.
         """
         with warnings.catch_warnings(action="ignore"):  # the page tells them
-            load_robot(source)
+            robot = load_robot(source)
         packaged = files("symgen.description") / "robots" / f"{source}.yaml"
         if source in packaged_robots():
             self.take_robot("robot.yaml", packaged.read_bytes())
         else:
             self.take_robot(source, content_of(Path(source)))
+            if Path(source).suffix.lower() in TREES and (beside := loops_beside(Path(source))):
+                self.take_loops(beside.content, write_robot(robot, "robot.yaml")[0])
 
     def edit_robot(self, text: str, *, draft: bool) -> None:
         """Save an edited robot table: as the robot file if it is valid, else as a draft.
@@ -170,8 +191,8 @@ class WorkFolder:
     def take_measured(self, kind: str, name: str, part: Path) -> None:
         """Use an uploaded file, or the folder of a bag, as the record or the validation record.
 
-        It replaces the one before, which `exchange_record` brings back. A new record starts a new
-        study.
+        The file replaces the earlier record, which `exchange_record` brings back. A new record
+        starts a new study.
 
         name : original name of the file.
         part : the uploaded file.
@@ -204,17 +225,18 @@ class WorkFolder:
 
     @property
     def record_before(self) -> str:
-        """Name of the record that the present one has replaced; "" if there is none."""
+        """Name of the record that the present record has replaced; "" if there was none."""
         before = [path.name for old in self.kept("record")[-1:] for path in old.glob("record/*")]
         return next(iter(before), "")
 
     def exchange_record(self) -> None:
-        """Exchange the record and its study with those before; done twice, it changes nothing.
+        """Exchange the record and its study with the earlier record and study; a second call
+        reverses the first.
 
-        InputError if there is none before.
+        Raise InputError if there is no earlier record.
         """
         if not self.record_before:
-            raise InputError("there is no record before; reload the page")
+            raise InputError("there is no earlier record; reload the page")
         earlier = self.kept("record")[-1]
         self._keep_record()
         for path in earlier.iterdir():
@@ -247,7 +269,7 @@ class WorkFolder:
     def study(self, name: str = "study.yaml") -> dict[str, Any]:
         """Read a study file as plain values, with the records as a list; {} if it is empty.
 
-        InputError if it is not valid YAML.
+        Raise InputError if the file is not valid YAML.
         """
         values = yaml_values(self.read(name), file=name)[0]
         values = values if isinstance(values, dict) else {}
@@ -257,8 +279,8 @@ class WorkFolder:
     def checked_study(self, given: Any) -> str:
         """Check the settings of a study, given as text or as values, and return them as text.
 
-        InputError if it is no valid study, or if it names a file of another folder that is not one
-        of the measured files, and that study.yaml did not name before.
+        Raise InputError if the study is not valid, or if it names a file outside the folder that is
+        no measured file of the studio and that study.yaml did not name before.
         """
         text = given if isinstance(given, str) else yaml_text(given)
         study = to_mapping(study_from_text(text, file="study.yaml"))
@@ -276,14 +298,16 @@ class WorkFolder:
         return sorted(path for path in (self.path / "runs").iterdir() if result_of(path))
 
     def run(self, name: str) -> Path:
-        """Return the results folder of the run `name`; InputError if there is none."""
+        """Return the results folder of the run `name`; raise InputError if there is none."""
         found = {path.name: path for path in self.results()}
         if name not in found:
             raise InputError("no such run; reload the page")
         return found[name]
 
     def robot_of(self, run: str) -> Path | None:
-        """Return the robot file that a run was made with; the present one if none was kept."""
+        """Return the robot file with which a run was made, or the present robot file if none was
+        kept.
+        """
         return next(self.path.glob(f"robot-{run}.*"), self.robot)
 
     def about(self, run: Path) -> dict[str, Any]:
@@ -311,10 +335,13 @@ class WorkFolder:
 
 
 def robot_file(name: str) -> str:
-    """Return the file name in the work folder for a robot file, such as robot.urdf for arm.urdf.
+    """Return the file name in the work folder for a robot file, such as robot.urdf for arm.urdf, or
+    for a file with loops.
 
-    InputError if `name` has no ending of a robot file.
+    Raise InputError if `name` has no ending of a robot file.
     """
+    if is_loops_file(name):
+        return LOOPS
     ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
     if ending not in ROBOT_ENDINGS:
         raise InputError(
@@ -337,7 +364,9 @@ def result_of(run: Path) -> str:
 
 
 def few_runs(levels: list[dict[str, Any]]) -> dict[str, int]:
-    """Numbers of runs of a resolution study, and that it needs; {} if its means are narrow enough."""
+    """Number of runs of a resolution study, and number that it needs; {} if the intervals of its
+    means are narrow enough.
+    """
     short = [level for level in levels if level["run_count"] < level["runs_needed"]]
     keys = {"runs": "run_count", "needed": "runs_needed"}
     return {key: max(level[of] for level in short) for key, of in keys.items()} if short else {}

@@ -2,9 +2,9 @@
 
 Host          127.0.0.1, localhost or [::1] with the port of the server; other names are refused
               (DNS rebinding)
-/TOKEN/...    128 random bits at the start of every path; without them nothing is found
+/TOKEN/...    128 random bits at the start of every path; without them, the answer is "not found"
 Origin        if it is given, and for every change: it must be the server's own (CSRF)
-size          of a body: at most the limit for its kind, counted as it arrives
+size          of the body of a request: at most the limit for its kind, counted as it arrives
 """
 
 from __future__ import annotations

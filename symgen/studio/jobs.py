@@ -43,7 +43,7 @@ class Job:
     words : tuple of str
         The command line.
     terminal : str
-        What does the same in a terminal, if the command is one of the studio alone.
+        Command that does the same in a terminal, if the studio uses a command of its own.
     result : str
         Name of the file that it writes in the work folder; the command failed if the file is
         missing.
@@ -102,7 +102,7 @@ class Job:
 
     @property
     def counted(self) -> tuple[int, int] | None:
-        """Numbers of finished steps and of all steps; None before the first of them is known."""
+        """Numbers of finished steps and of all steps; None before the first number is known."""
         pairs = zip(self.told("done")[-1:], self.told("total")[-1:], strict=False)
         return next(((done, total) for done, total in pairs if total), None)
 
@@ -158,8 +158,8 @@ class Jobs:
 
     @property
     def shown(self) -> list[Job]:
-        """List the commands that are open, or that have failed and were neither dismissed nor followed
-        by one of the same task that is done.
+        """List the commands that are open, and the failed commands that were neither dismissed nor
+        followed by a successful command of the same task.
         """
         done = {job.task: job.number for job in self.all if job.state == DONE}
         return [
@@ -170,9 +170,9 @@ class Jobs:
         ]
 
     def left(self, job: Job) -> float | None:
-        """Expected time until a running command ends, s; None if nothing is known of it.
+        """Expected time until a running command ends, s; None if it is unknown.
 
-        It is known from the steps that are done, or from the last command of the same task.
+        The time follows from the finished steps, or from the last command of the same task.
         """
         passed = time.monotonic() - job.started
         if job.state != RUNNING:

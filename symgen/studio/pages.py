@@ -30,7 +30,7 @@ from symgen.description.yaml import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of, measured_name, remove, robot_file
+from symgen.studio.folder import DRAFT, LOOPS, json_of, measured_name, remove, robot_file
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -58,8 +58,8 @@ ESTIMATORS = {
 class Pages:
     """The request handlers of one studio server.
 
-    Handlers of GET answer with a page. Handlers of POST change something and return the name of the
-    part of the page to show again, that of another page, or "" for the whole page.
+    Handlers of GET answer with a page. Handlers of POST change data and return the name of the part
+    of the page to show again, the name of another page, or "" for the whole page.
     """
 
     def __init__(self, server: Server) -> None:
@@ -274,10 +274,8 @@ class Pages:
             if kind != "robot":
                 await self._readable(part)
                 self.folder.take_measured(kind, name, part)
-            elif "error" in (shown := await self.server.view(views.robot, str(part), "")):
-                raise InputError(f"{name[:80]}: {shown['error']}")
             else:
-                self.folder.take_robot(name, content_of(part))
+                await self._take_robot(name, part)
         finally:
             remove(folder)
         if kind == "validation":  # the page stays
@@ -285,13 +283,31 @@ class Pages:
             return PlainTextResponse(self.folder.measured(kind))
         return await self._changed("")
 
+    async def _take_robot(self, name: str, part: Path) -> None:
+        """A robot, or the loops of the robot that is there, beside a copy of its own file."""
+        robot, loops = part, part.name == LOOPS
+        if loops:
+            if (own := self.folder.first(TREES)) is None:
+                raise InputError(
+                    f"{name[:80]}: loops belong to a URDF or MJCF file; drop that first"
+                )
+            robot = part.with_name(own.name)
+            robot.write_bytes(own.read_bytes())
+        shown = await self.server.view(views.robot, str(robot), "")
+        if "error" in shown:
+            raise InputError(f"{name[:80]}: {shown['error']}")
+        if loops:
+            self.folder.take_loops(content_of(part), shown["text"])
+        else:
+            self.folder.take_robot(name, content_of(part))
+
     async def _readable(self, part: Path) -> None:
         """Refuse a file that is no table, before it replaces one; which topic of a bag counts is asked later."""
         if not part.name.lower().removesuffix(".gz").endswith(file_extensions(packed=True)):
             return
         value = await self.server.view(views.preview, str(part), {"topic": None, "joints": ()})
         if "error" in value:
-            raise InputError(f"{part.name[:80]}: {value['error']}; the record before stays")
+            raise InputError(f"{part.name[:80]}: {value['error']}; the earlier record stays in use")
 
     async def _earlier_record(self, form: dict[str, str]) -> str:
         self.folder.exchange_record()
@@ -366,14 +382,18 @@ class Pages:
         return "findings"
 
     def _of_the_study(self, title: str, program: str, *options: str) -> None:
-        """Queue a program of the studio that reads robot and study, and writes a file of its name."""
+        """Queue a program of the studio that reads robot and study, and writes a file named after
+        the program.
+        """
         robot, study = self._command()
         terminal = shlex.join(("symgen", "identify", robot, study, *options))
         result = f"{program}.json"
         self.jobs.add(title, (program, robot, study, result), result, terminal=terminal)
 
     def _repaired(self) -> dict[str, Any]:
-        """Return what the last repair has changed, or tried; {} if robot or study are others now."""
+        """Return the changes that the last repair has made or tried; {} if robot or study have
+        changed since.
+        """
         told = json_of(self.folder.path / "repair.json")
         now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
         return told if told.get("of") == now else {}

@@ -1,6 +1,6 @@
 """Shared state of all requests of the studio: work folder, command queue and view processes.
 
-It needs pip install symgen[studio].
+The module needs the extra: pip install symgen[studio].
 """
 
 from __future__ import annotations

@@ -34,7 +34,8 @@ PULSE = 0.25  # s between two events of one page
 def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
     """Build the web application of the studio, with a secret token at the start of every path.
 
-    `end` is called after no page has been open, and no command has run, for IDLE_TIME seconds.
+    The function `end` is called when no page has been open and no command has run for ten minutes
+    (`IDLE_TIME`).
     """
 
     async def events(request: Request) -> Response:
@@ -100,10 +101,10 @@ async def idle(server: Server, end: Callable[[], None]) -> None:
 
 
 def listening_at(folder: Path, port: int, *, renew: bool) -> tuple[str, socket.socket]:
-    """Return the token and the open port of a server of a work folder: those of the server before.
+    """Return token and open port for the server of a work folder, the same as for its last server.
 
-    They stand in a file that only its owner reads; a file that others can read is not used. Where
-    another server has the port, a free one is taken for now.
+    Both are stored in a file that only its owner can read; a file that others can read is not used.
+    If another program uses the port, a free port is used this time.
     """
     path = folder / ADDRESS
     owned = path.is_file() and (os.name == "nt" or not path.stat().st_mode & 0o077)
@@ -140,8 +141,9 @@ def serve(
 ) -> None:
     """Serve the page of a work folder until Ctrl-C, or until `idle` ends it.
 
-    port : 0 for that of the last server of the folder, or for a free one.
-    renew : take another port and token than the last server, so that old bookmarks find nothing.
+    port : 0 for the port of the last server of the folder, or for a free port.
+    renew : whether to use another port and token than the last server, so that old bookmarks do not
+      work.
 
     Raises InputError or SymgenError if robot or record cannot be used.
     """

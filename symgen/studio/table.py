@@ -84,7 +84,9 @@ def _texts(x: Any) -> Any:
 
 
 def columns_of(cells: Mapping[str, Any]) -> list[str]:
-    """Return the columns of a table; a classic (distal) one has gamma and b only if they are typed."""
+    """Return the columns of a table; a classic (distal) table has gamma and b only if the user has
+    entered them.
+    """
     convention = cells["convention"]
     typed = {column for row in cells["frames"].values() for column in row}
     return [
@@ -109,8 +111,8 @@ def degrees(
 def with_cells(text: str, asked: str) -> str:
     """Write edited cells into the text of a robot file.
 
-    asked : the cells, in JSON with the form of `cells_of`. Other parts stay, with their comments.
-        A cell may hold the signs of a textbook: 90° is written as 90*pi/180, π/2 as pi/2.
+    asked : the cells, in JSON with the form of `cells_of`. Other parts stay, with their comments. A
+      cell may contain the signs of a textbook: 90° is written as 90*pi/180, π/2 as pi/2.
 
     Raises DescriptionError if `asked` is no such table.
     """
@@ -165,7 +167,7 @@ def wrong(text: str) -> DescriptionError | None:
 def errors(text: str) -> list[DescriptionError]:
     """List the errors in the text of a robot file, each once.
 
-    Behind each error, the robot is read again with a usual value in place of the wrong one. An
+    After each error, the robot is read again with a usual value in place of the wrong value. An
     error in a value that was replaced, or in a part that the table does not show, ends the search.
     """
     found: list[DescriptionError] = []
@@ -184,7 +186,7 @@ def errors(text: str) -> list[DescriptionError]:
 
 
 def _without(text: str, path: tuple[str | int, ...]) -> str:
-    """Replace the value that a path names by a usual one, or leave out a part that is no cell."""
+    """Replace the value that a path names by a usual value, or leave out a part that is no cell."""
     cells = cells_of(text)
     part, *keys = (*map(str, path), "")
     if part in SIZED:

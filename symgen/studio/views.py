@@ -48,7 +48,8 @@ TYPESET = 1000  # terms of a closed form that a browser draws at once
 def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
     """Wrap a function so that an error is returned as a mapping with the keys error and path.
 
-    Warnings of the library are added to the value as notes; that angles were rounded is a remark.
+    Warnings of the library are added to the value as notes; a warning of rounded angles becomes a
+    remark.
     """
 
     @wraps(view)
@@ -155,8 +156,8 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Prepare a symbolic model of the robot in four forms: typeset, text, LaTeX and SymPy.
 
-    The form is the one asked for; a closed form of more than TYPESET terms is not typeset. A model
-    that has too many terms for a closed form is its recursion in all forms.
+    The form is the requested one; a closed form of more than 1000 terms (`TYPESET`) is not typeset.
+    If a model has too many terms for a closed form, all forms show its recursion.
     """
     from symgen.symbols.documents import notes, printed, shown_model
     from symgen.symbols.symbolic_model import NoClosedFormError
@@ -188,7 +189,7 @@ def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 
 def meanings_of(asked: Any, form: str) -> dict[str, str]:
-    """Say of the symbols of a symbolic model, by their printed texts, what they are."""
+    """Describe the symbols of a symbolic model, by their printed texts."""
     from symgen.derive.names import FAMILIES, MEMBER
     from symgen.symbols import expressions
     from symgen.symbols.printers import math
@@ -208,7 +209,7 @@ def meanings_of(asked: Any, form: str) -> dict[str, str]:
 
 
 def bare(markup: str) -> str:
-    """The text of a piece of MathML, as a browser has it."""
+    """The text of a piece of MathML, as a browser copies it."""
     return unescape(re.sub(r"<[^>]*>|\s", "", markup))
 
 
@@ -228,9 +229,9 @@ def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
     `columns`, names separated by commas, selects the columns with rows and lines. The result
     includes the roles of columns as far as their names show them, as in `identify --suggest`, and
     sampling rate and gaps of the time column `t` in its `unit`. If `decimal` is not given, the
-    decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a
-    word for current or effort; `others` counts the joints of the file if they are more than those
-    of the robot.
+    decimal mark that reads more columns is used. `currents` says whether a name in `tau` has a word
+    for current or effort; `others` is the number of joints of the file if it exceeds that of the
+    robot.
     """
     from runtime.ground.clock import time_stamps
     from runtime.reading.formats import read_table
@@ -379,7 +380,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
 
 @answered
 def findings(robot_file: str, study_file: str) -> dict[str, Any]:
-    """Check record, study and robot; list checks, remedies, and uncertain parameters.
+    """Check record, study and robot, and list checks, remedies and uncertain parameters.
 
     The uncertainty is the predicted standard deviation of each parameter, % of its largest possible
     value.
@@ -407,10 +408,10 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
 
 @answered
 def repair(robot_file: str, study_file: str) -> dict[str, Any]:
-    """Search the errors of the study, and write the mended study over it; list what has changed.
+    """Search for the errors of the study, and write the mended study over it; list the changes.
 
-    The list has the text of the study before, so that it can come back. If the study or the robot
-    has been changed meanwhile, nothing is written.
+    The list contains the earlier text of the study, so that it can be restored. If the study or the
+    robot has been changed meanwhile, nothing is written.
     """
     from runtime.compose import records_of
     from runtime.study import located
@@ -446,12 +447,13 @@ def check() -> None:
 
 
 def mend() -> None:
-    """Repair the study named on the command line, and write what has changed to a file."""
+    """Repair the study named on the command line, and write the changes to a file."""
     _written(repair)
 
 
 def _written(view: Callable[..., dict[str, Any]]) -> None:
-    """Compute a view of ROBOT and STUDY and write it to FILE; these are the arguments.
+    """Compute a view of ROBOT and STUDY and write it to FILE; ROBOT, STUDY and FILE are the
+    arguments.
 
     If there is an error, print it as a line of JSON and exit with code 2.
     """
@@ -469,7 +471,8 @@ def digest_of(*paths: Path) -> str:
 
 
 def _shown(lines: np.ndarray) -> np.ndarray:
-    """Indices of the samples of lines that are sent: all, if they are not too many.
+    """Indices of the samples of plotted lines that are sent to the page: all samples, unless they
+    are too many.
 
     lines : shape (m, N).
     """

@@ -1,4 +1,4 @@
-"""Name in messages the place of the page that does what a command of the terminal does.
+"""Replace commands of the terminal in messages by the place of the page that does the same.
 
 Messages of the library name commands and options; on a page, a reader looks for a button.
 """

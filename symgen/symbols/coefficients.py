@@ -5,7 +5,7 @@ applies these identities from left to right, if the result is shorter:
 
     1 - C**2 = S**2 ,     Ca Cb - Sa Sb = C(a + b) ,     Sa Cb + Ca Sb = S(a + b) ,
 
-and the same for a - b. A sum or difference of angles is used only if it is itself an angle of the
+and similarly for a - b. A sum or difference of angles is used only if it is itself an angle of the
 model, as for joints with parallel axes. `Factors` then writes a coefficient with as few symbols as
 possible.
 """
@@ -130,7 +130,7 @@ def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
 
 
 def forward(angle: Angle) -> tuple[Angle, int]:
-    """Change the sign of an angle if it starts with a minus, for instance -q1 - q2 to q1 + q2.
+    """Change the sign of an angle that starts with a minus; for instance, -q1 - q2 becomes q1 + q2.
 
     Returns the angle and the sign, 1 or -1, by which its sine must be multiplied.
     """
@@ -190,8 +190,8 @@ class Factors:
     def _shortest(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
         """Write a coefficient with as few symbols as possible, as a number and a list of factors.
 
-        All terms are put in one bracket, or in several: one bracket for each monomial in the rates,
-        in the variables that are no rates, or in the constants.
+        All terms are in one bracket, or there is one bracket for each monomial in the rates, in the
+        variables that are no rates, or in the constants.
         """
         terms = {m: c[m] for m in sorted(c, key=self._order)}
         ways = [[c], *([*self._parts(terms, fields)] for fields in self.fields)]
@@ -205,7 +205,7 @@ class Factors:
         return number * number_of_rest, [*self._powers(common), *factors]
 
     def _symbols(self, c: Coefficient) -> int:
-        """Count the symbols that a coefficient needs if it is written with one bracket."""
+        """Count the printed symbols of a coefficient that is written as a product with one bracket."""
         number, shared = _content(c), sum(map(min, zip(*c, strict=True)))
         inside = sum(sum(m) - shared + (abs(n) != number) for m, n in c.items())
         return int(inside + shared + (number != 1))
@@ -268,8 +268,8 @@ class Factors:
 def _content(c: Coefficient) -> Fraction:
     """Return the number that can be factored out of all terms of a coefficient.
 
-    It is the greatest number that divides all terms. Different decimals have no common factor: 0.5
-    x + 0.8636 y is easier to read than 0.0004 (1250 x + 2159 y).
+    The result is the greatest number that divides all terms. Different decimals have no common
+    factor: 0.5 x + 0.8636 y is easier to read than 0.0004 (1250 x + 2159 y).
     """
     sizes = {abs(n) for n in c.values()}
     if len(sizes) > 1 and any(8 % n.denominator for n in sizes):

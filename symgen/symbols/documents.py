@@ -91,8 +91,8 @@ EXPANDED = 2000  # terms that are multiplied out to see
 def printed(model: SymbolicModel, form: str, language: str) -> str:
     """Write a model in a form (closed or recursive) and a format (text, latex, sympy, json, ...).
 
-    Raises SymgenError if the form or the format is unknown, or if the model does not have this form
-    or has too many terms in it.
+    Raises SymgenError if the form or the format is unknown, if the model does not have this form,
+    or if this form has too many terms.
     """
     require_name(form, FORMS, "form")
     require_name(language, FORMATS, "format")
@@ -119,7 +119,7 @@ class Formulas:
 def closed_texts(model: SymbolicModel) -> dict[str, str]:
     """Return the nonzero entries of a model in closed form as texts, by name, such as A(1,2).
 
-    If the model has a denominator, these are the numerators.
+    If the model has a denominator, the texts are those of the numerators.
     """
     entries = model.closed.entries
     return {model.label(p): plain(entries[p]) for p in model.places if p in entries}
@@ -141,7 +141,9 @@ def notes(model: SymbolicModel) -> list[str]:
     if source.given:
         lines.append("With " + ", ".join(f"{name} = {e}" for name, e in source.given.items()) + ".")
     if model.model.axes:
-        symmetric = ", those below the diagonal are those above it" if model.model.symmetric else ""
+        symmetric = (
+            "; entries below the diagonal equal those above" if model.model.symmetric else ""
+        )
         lines.append(f"Entries that are not shown are zero{symmetric}.")
     if model.model.denominator:
         lines.append(f"Each entry is to be divided by {model.model.denominator}, the last line.")
@@ -195,8 +197,8 @@ def text(model: SymbolicModel, form: str) -> str:
 def text_lines(model: SymbolicModel, form: str) -> list[str]:
     """Write the formulas of a model as lines of text.
 
-    For the closed form these are the angles and the entries, for the recursion its equations under
-    their headings.
+    A closed form is written as its angles and entries, a recursion as its equations under their
+    headings.
     """
     if form == "closed":
         closed = model.closed
@@ -384,7 +386,8 @@ def width(text: str) -> int:
 def escaped(text: str) -> str:
     """Replace the special characters of plain text, so that LaTeX prints the text unchanged.
 
-    A letter that many fonts lack is written by the command \\other, which PREAMBLE defines.
+    A letter that many fonts lack is written by the command \\other, which the preamble of the
+    document defines.
     """
     return "".join(_SPECIAL.get(c) or _written(c) for c in text)
 
@@ -524,7 +527,7 @@ def json_text(model: SymbolicModel, form: str) -> str:
 class ShownModel:
     """A model as shown on the HTML page of a robot.
 
-    A closed form has its `entries` (label, terms). Any other model has in `steps` the equations of
+    A closed form has its `entries` (label, terms). Any other model has `steps`, the equations of
     its recursion under their headings.
     """
 
@@ -539,7 +542,7 @@ class ShownModel:
 def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
     """Prepare the models of a robot for its HTML page, and the notes on its passive joints.
 
-    A short closed form is shown as such, a long one as recursion.
+    If the closed form of a model is long, its recursion is shown instead.
     """
     robot = regrouping.robot
     source = source_of(robot, regrouping=regrouping)
@@ -557,8 +560,8 @@ def shown_model(
 ) -> ShownModel | None:
     """Prepare a model for an HTML page; None if it has no short closed form and no recursion.
 
-    form : recursive, or closed for the closed form where it is short.
-    readable : largest number of terms of a short one.
+    form : recursive, or closed for the closed form if it is short. readable : largest number of
+      terms of a short closed form.
     """
     title = model.model.name.replace("_", " ")
     try:

@@ -53,7 +53,8 @@ class Expansion:
     outputs : sequence
         Values of the graph whose polynomials are needed.
     limit : int
-        Largest number of terms of a polynomial. TooManyTermsError is raised beyond.
+        Largest number of terms of a polynomial. TooManyTermsError is raised if a polynomial has
+        more.
     decimals : bool
         Whether functions of numbers alone, such as sin(1.571), become decimals. A printed number
         then has at most DIGITS digits.
@@ -151,7 +152,7 @@ class Expansion:
     def _constant(self, node: Node) -> Expression:
         """Return the constant value of a node: a square root, or a cosine or sine of a fixed angle.
 
-        Zero if the angle depends on joint positions.
+        The result is zero if the angle depends on joint positions.
         """
         value: Expression = node.value if node.op == "sqrt" else Expression()
         if node.op != "sqrt" and not node.value.turn:

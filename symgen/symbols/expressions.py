@@ -82,7 +82,7 @@ def total(terms: Iterable[Tree]) -> Tree:
 
 
 def expression(e: Expression) -> Tree:
-    """Convert a constant expression, or one linear in joint positions, to a SymPy expression.
+    """Convert an expression that is constant, or linear in joint positions, to a SymPy expression.
 
     The order of its terms is the order of its printed text.
     """
@@ -166,7 +166,7 @@ def evaluated(x: Tree, values: Mapping[str, Any]) -> Any:
 def in_decimals(regrouping: Regrouping) -> Regrouping:
     """Convert the numerical coefficients of the regrouping formulas to decimals, for display.
 
-    The decimals have DIGITS digits. Coefficients that contain symbols are not changed.
+    The decimals have 15 digits. Coefficients that contain symbols are not changed.
     """
 
     base = (

@@ -43,8 +43,8 @@ class Source:
     robot : Robot
         The robot; given numbers replace its constants.
     closure : Closure
-        Each joint as a function of the independent ones. A passive joint that stays a symbol counts
-        as a joint that only the closure equations determine.
+        Each joint as a function of the independent joints. A passive joint that stays a symbol
+        counts as a joint that only the closure equations determine.
     relations : Closure
         The relations of the passive joints. They differ from `closure` if all passive joints stay
         symbols.
@@ -109,7 +109,7 @@ class Source:
     def _rate(self, u: int, i: int, algebra: GraphAlgebra) -> Scalar:
         """Compute the rate dq_u/dq_i of passive joint u with respect to independent joint i.
 
-        It is a number if a linear relation gives q_u. Rates of joints that only the closure
+        The rate is a number if a linear relation gives q_u. Rates of joints that only the closure
         equations determine enter as symbols.
         """
         row, tied = self.relations.row[u], self.relations.tied

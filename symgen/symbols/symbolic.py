@@ -30,7 +30,8 @@ def symbolic(
 ) -> SymbolicRobot:
     """Prepare the models of a robot as exact SymPy objects.
 
-    The closed form of a model is a method of the result, its recursion comes from `equations`.
+    The closed form of a model is a method of the result; its recursion comes from the method
+    `equations`.
 
     Parameters
     ----------
@@ -43,9 +44,9 @@ def symbolic(
         in robot files ("pi/2"). Terms that become zero are removed from the recursion.
     passive : str, optional
         How passive joints of closed loops are written. "functions": as functions of the actuated
-        joints, if the relation is linear. "symbols": all stay symbols, and their equations are
-        those of the model `closure`, closure = 0. Default: functions where the relation is linear,
-        symbols for the rest.
+        joints, if the relation is linear. "symbols": all passive joints stay symbols, and the model
+        `closure` has their equations, closure = 0. Default: functions for joints with a linear
+        relation, symbols for the others.
     limit : int
         Largest number of terms of a closed form before it is factored. A longer closed form is
         refused; a recursion has no limit.
@@ -61,8 +62,8 @@ def symbolic(
     Raises
     ------
     SymgenError
-        If a value is given for an unknown symbol, or if "functions" is requested and passive joints
-        have no linear relation.
+        A value is given for an unknown symbol, or "functions" is requested and passive joints have
+        no linear relation.
 
     Examples
     --------
@@ -100,7 +101,7 @@ class SymbolicRobot:
         Raises
         ------
         SymgenError
-            If the model or the frame does not exist.
+            The model or the frame does not exist.
         """
         require_name(name, SYMBOLIC, "name")
         require(of, (int, type(None)), "of", "the number of a frame")
@@ -182,7 +183,7 @@ class SymbolicRobot:
     def symbols(self) -> dict[str, Any]:
         """All symbols of the models by name, for instance q1, QP1, GAM1 and ZZ1R.
 
-        These are the constants, positions, velocities, accelerations, torques and parameters, and
+        The symbols are constants, positions, velocities, accelerations, torques and parameters, and
         the rates G of passive joints that only the closure equations determine.
         """
         robot = self.source.robot

@@ -41,9 +41,9 @@ class NoClosedFormError(SymgenError):
     Parameters
     ----------
     reason : str
-        What is too large.
+        Description of the closed form that is too large.
     instead : str
-        The form or models that work.
+        Form or models that can be used instead.
     """
 
     def __init__(self, reason: str, instead: str) -> None:
@@ -180,9 +180,9 @@ class SymbolicModel:
     source : Source
         The robot with its parameters, closure and given values.
     request : Request
-        The frame whose model is meant, and the frame of its components.
+        The frame that the model describes, and the frame of its components.
     rows : tuple of int or None
-        Rows of the Jacobian, from 1, whose determinant is meant.
+        Rows of the Jacobian, from 1, of which the determinant is computed.
     limit : int
         Largest number of terms of the expanded closed form.
     """
@@ -242,8 +242,8 @@ class SymbolicModel:
     def closed(self) -> ClosedModel:
         """The closed form of the model: each entry as one factored formula.
 
-        Raises NoClosedFormError if the closed form has too many terms, SymgenError if it does not
-        exist; the message names the form that works.
+        Raises NoClosedFormError if the closed form has too many terms, SymgenError if there is no
+        closed form; the message names the form that works.
         """
         try:
             return self._closed()
@@ -354,7 +354,7 @@ class SymbolicModel:
     def _chosen_rows(self, matrix: Sequence[Sequence[Polynomial]], n: int) -> list[int]:
         """Choose the rows of the Jacobian for its determinant, as many as it has columns.
 
-        These are the rows that the user gave, else all rows that are not zero. Raises SymgenError
+        The rows are those that the user gave, else all rows that are not zero. Raises SymgenError
         if they do not make a square matrix.
         """
         if self.rows is not None:

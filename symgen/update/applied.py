@@ -39,8 +39,8 @@ class Change:
         record does not determine it alone.
     told_by : str
         Source of the value. record: the record determines it. sum: the record determines only a sum
-        with other numbers, and this is the value nearest to the file. file: no torque depends on
-        the number, and it changes only if no physical robot is possible otherwise.
+        with other numbers, and the new value is the one nearest to the file. file: no torque
+        depends on the number, and it changes only if no physical robot is possible otherwise.
     """
 
     place: str
@@ -81,7 +81,7 @@ class Applied:
         Numbers of links that affect no torque and keep the value of the file. A number of this kind
         that had to change is listed in `changes`, with `told_by` "file".
     strange : tuple of str
-        Links whose mass or centre is far from that of the file.
+        Links whose mass or centre is far from the value in the file.
     lost : tuple of str
         Base parameters that are not in the estimate or not determined; they keep the values of the
         file.
@@ -145,7 +145,7 @@ class Applied:
     def answer(self) -> list[str]:
         """Say in sentences what the new file explains, what is far from the file, and what is left.
 
-        The parameters that the format cannot store follow, one a line.
+        The parameters that the format cannot store follow, one per line.
         """
         count, rest = len(self.changes), len(self.placeless)
         head = f"{self.file}: {count or 'no'} number{'s' * (count > 1)} change{'s' * (count < 2)}"
@@ -252,7 +252,7 @@ class Applied:
 
 
 def _percent(c: Change) -> str:
-    """Write the change in % of the number before; "-" if this number is zero."""
+    """Write the change in % of the old number; "-" if the old number is zero."""
     return f"{100 * (c.after - c.before) / abs(c.before):+.3g}" if abs(c.before) > NOTHING else "-"
 
 

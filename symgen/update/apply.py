@@ -7,7 +7,7 @@
 An estimate gives base parameters, which are sums of the parameters of several links. Of all
 physical robots that have these sums, the robot nearest to the file is written
 (`symgen.update.nearest`). Before the result is returned, the new text is read again, and its values
-must be those that were to be written.
+must agree with the intended values.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Writing:
     nearest : Nearest
         The values to be written.
     own : mapping
-        Family and joint of the parameters of elements that act along one joint, by name.
+        Family and joint of each parameter of an element that acts along one joint, by its name.
     root : ndarray, shape (b, b)
         Square root of the covariance of the base parameters.
     """
@@ -126,7 +126,8 @@ class Writing:
     def sigma(self, k: int) -> float:
         """Compute the standard deviation of number k in the list of all link and joint values.
 
-        The result is nan if the record does not determine the number, or only in sums.
+        The result is nan if the record does not determine the number, or determines only sums with
+        it.
         """
         if self._told_by(k) != "record":
             return np.nan
@@ -136,7 +137,8 @@ class Writing:
     def placeless(self) -> dict[str, float]:
         """New values, by name, of parameters that the file format cannot store.
 
-        They are the motor inertias, also those of zero, and the other parameters that changed.
+        The mapping has all motor inertias, including zero values, and the other parameters that
+        changed.
         """
         return {
             name: float(self.nearest.u[k])
@@ -201,8 +203,8 @@ def apply(
     ----------
     estimate : Estimate, Identification, str or Path
         Result of an identification, its estimate.json, or the folder that `symgen identify -o`
-        wrote. Of an Identification, the parameter set in use is taken, or the physical set if the
-        essential set is in use (`Identification.whole_estimate`).
+        wrote. The values of an Identification are those of the parameter set in use or, if that is
+        the essential set, of the physical set.
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str, Path or Robot, optional
@@ -399,7 +401,7 @@ def _determined_names(
 def _root(result: Estimate, names: Sequence[str]) -> Array:
     """Compute a matrix square root (b, b) of the covariance of the determined base parameters.
 
-    Its standard deviations are the corrected ones where there are any. The result is zero if the
+    The corrected standard deviations are used if there are any. The result is zero if the
     covariance is unknown.
     """
     at = [result.names.index(name) for name in names]

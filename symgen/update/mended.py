@@ -1,4 +1,4 @@
-"""Search the errors of a study with the model of a robot, and write the mended study as text."""
+"""Search for the errors of a study with the model of a robot, and write the mended study as text."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def mended(
     """Repair a study (`runtime.repair`); return the repair, and the text of the mended study.
 
     described : the robot, as its file describes it.
-    records : those of the study.
-    folder : that of the mended study, to which the names of its files are relative.
+    records : records of the study.
+    folder : folder of the mended study, to which the names of its files are relative.
 
-    The text is "" if nothing changes. InputError if records or study cannot be repaired.
+    The text is "" if nothing changes. Raise InputError if records or study cannot be repaired.
     """
     import runtime
     from runtime.compose import records_of
@@ -46,8 +46,9 @@ def mended(
     ):
         if not (same(read.q, meant.q) and same(read.tau, meant.tau)):
             raise InputError(
-                "the changes found are not those that the study would make; nothing is written; "
-                "make them by hand: " + "; ".join(change.line for change in repair.changes)
+                "the mended study would not have the effect of the changes that were found, so that "
+                "nothing is written; make these changes by hand: "
+                + "; ".join(change.line for change in repair.changes)
             )
     return repair, study_text(repair.study, folder, defaults=False, comments=repair.comments)
 

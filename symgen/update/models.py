@@ -1,4 +1,6 @@
-"""The model of a robot as a study needs it: corrected by the study, with columns of force sensors."""
+"""The model of a robot for a study, with the corrections of the study and the columns of its force
+sensors.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ def model_of(robot: Robot | GeneratedModel, *, study: Study | None = None) -> Ge
 def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedModel:
     """Replace entries of a robot by those of the section `robot` of a study, if it has one.
 
-    A generated module stays as it is: the study is refused with it, unless it has the corrections.
+    A generated module stays as it is: a later step refuses the study unless the module has its
+    corrections.
     """
     from symgen.description import Robot
     from symgen.description.corrected import corrected
@@ -40,7 +43,7 @@ def corrected(robot: Robot | GeneratedModel, study: Study) -> Robot | GeneratedM
 def variants_of(robot: Robot | GeneratedModel) -> GeneratedModel | None:
     """Load the model of a robot as a module in which the frame table can be changed.
 
-    None for a generated module, which has no robot file.
+    Return None for a generated module, which has no robot file.
     """
     from runtime.core.model import load_model
     from symgen.certify.variants import variants

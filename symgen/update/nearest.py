@@ -1,6 +1,6 @@
 """Find the physically possible robot with given base parameters, nearest to a file's values.
 
-This is the optimisation of the feasible estimate in `identify`, with the file as prior:
+The optimisation is that of the feasible estimate in `identify`, with the file as prior:
 
     min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of
     `runtime.physical.inertia`
@@ -15,10 +15,10 @@ elements:
 K chi(u) = X is linearised and solved repeatedly until it holds. If the resulting numbers are no
 physical robot, a semidefinite program finds chi: K chi = X and the conditions are linear in chi,
 and the distance in u is linearised repeatedly. Both ways have the same order of preference: a motor
-inertia gets what the torques cannot separate from it, whether the format has a place for it or not.
-A number on which no base parameter depends does not change. A mass does not change if base
-parameters depend on it only through its first moment and its tensor. Such a number or mass changes
-only if no physical robot is possible otherwise.
+inertia receives all inertia that the torques cannot separate from it, whether or not the format has
+a place for motor inertias. A number on which no base parameter depends does not change. A mass does
+not change if base parameters depend on it only through its first moment and its tensor. Such a
+number or mass changes only if no physical robot is possible otherwise.
 
 A body may be several links, held together by fixed joints: the record determines only their sum.
 First, only the link on the moving joint changes, or, if it has no mass, the next link; the other
@@ -34,7 +34,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.ground.limits import limits
-from runtime.physical.feasibility import blocked, feasibility, limit_rows, nearest_in, scales, units
+from runtime.physical.feasibility import (
+    blocked,
+    feasibility,
+    limit_rows,
+    nearest_physical,
+    scales,
+    units,
+)
 from runtime.physical.inertia import INERTIAL, PhysicalModel
 from runtime.physical.semidefinite import LinearBounds, Space, margin, solutions, within
 from symgen.description.tree import Array
@@ -98,7 +105,7 @@ class Nearest:
 class Numbers:
     """Unknowns of the optimisation in `nearest`: link and joint values as in the file.
 
-    Each link of the file has ten unknowns; joint parameters are those of the elements on the
+    Each link of the file has ten unknowns; the joint parameters are those of the elements on the
     joints.
 
     Attributes
@@ -175,7 +182,7 @@ def nearest(
     physical : PhysicalModel
         Model of the robot, with one link for each body.
     links : sequence of FileLink
-        Links of the file. The first link with mass of a body is the one that changes first.
+        Links of the file. In each body, the first link with mass changes first.
     values : mapping, SI
         Values of the elements on the joints, by name.
     names : sequence of str
@@ -183,7 +190,8 @@ def nearest(
     X : ndarray, shape (len(names),), SI
         Values of these base parameters.
     absent : collection of str
-        Elements that the file does not have; they change only if the links cannot.
+        Elements that the file does not have; they change only if a change of the links is not
+        enough.
 
     Raises
     ------
@@ -236,10 +244,10 @@ def _of_file(
 ) -> tuple[Numbers, dict[str, int], list[int]]:
     """Collect the unknowns of `nearest` from the file, sorted by the attempt that may change them.
 
-    Return the unknowns, the index of each element, and for each attempt how many numbers may
-    change. The first attempt has the first link with mass of each body, and the elements. The
-    second adds elements that the file does not have and that other parameters can replace; the
-    third adds the other links.
+    Return the unknowns, the index of each element, and the number of values that each attempt may
+    change. The first attempt may change the first link with mass of each body, and the elements.
+    The second attempt adds elements that the file does not have and that other parameters can
+    replace; the third attempt adds the other links.
     """
     massless_last = sorted(links, key=lambda link: link.ten[-1] <= NO_MASS)
     leading = {link.j: link for link in reversed(massless_last)}
@@ -324,8 +332,9 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
 def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
     """Find the link and joint values of a physically possible robot with given base parameters.
 
-    The equation is K chi(u) = rest, with the standard parameters chi. Return u and "", or None and
-    the reason why no physical robot has these base parameters.
+    The equation is K chi(u) = rest, with the standard parameters chi; `rest` is the part of the
+    base parameters X that does not come from values which stay as in the file. Return u and "", or
+    None and the reason why no physical robot has these base parameters.
     """
     K = part.physical.rows(names)
     sizes = np.maximum(np.abs(X), np.abs(K) @ scales(part.physical))
@@ -353,10 +362,12 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 
 def _clean(part: Numbers, K: Array, rest: Array, u: Array, missed_most: float) -> Array:
-    """Set numbers that have hardly moved to those of the file; the others then give K chi = rest.
+    """Reset numbers that have hardly moved to their values in the file, and let the others give K
+    chi = rest.
 
-    A number that moved by NEAR of its size is one of the file if the others can do without it, and
-    one that moved by EQUAL of its size in any case that K chi = rest allows.
+    A number that moved by less than 1e-6 of its size (`NEAR`) is reset if the others can compensate
+    for it; a number that moved by less than 1e-9 of its size (`EQUAL`) is reset whenever K chi =
+    rest allows it.
     """
     near = NEAR * part.size
     alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
@@ -402,14 +413,14 @@ def _solve(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> A
 def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> Array:
     """Find the link and joint values of the physical robot nearest to the file.
 
-    This is the optimisation of `_solve`, with every condition of a physical robot. K chi = rest and
+    The optimisation is that of `_solve`, with every condition of a physical robot. K chi = rest and
     the conditions are linear in the standard parameters chi, and hold exactly. The distance from
     the file is linearised repeatedly, first at u:
 
         u(chi) = u + T^-1 (chi - chi(u)),    T = d chi / d u
 
-    The motor inertias, which move with the greatest ease, are at last those nearest to the file
-    that the links leave.
+    Finally, the motor inertias, which move most easily, get the values nearest to the file that the
+    links allow.
 
     u : values of `_solve`, or of the file. start : standard parameters of a physical robot with
     K chi = rest.
@@ -422,7 +433,7 @@ def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> A
         W, w = _linear(part, u)
         space = _holding(part, K, rest, u, held)
         criterion = W / part.ease[:, None], w / part.ease
-        chi = nearest_in(space, part.physical, rows, start, criterion)
+        chi = nearest_physical(space, part.physical, rows, start, criterion)
         before, u = u, _numbers(part, chi)
         if (far := float(np.linalg.norm((u - part.u0) / S))) < distance:
             distance, best = far, u
@@ -435,11 +446,12 @@ def _physical(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> A
 
 
 def _held(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> tuple[Array, Array]:
-    """Find the numbers that a physical robot can keep as in the file, of those `_solve` keeps.
+    """Find which of the numbers that `_solve` keeps can keep their values in a physical robot.
 
-    These are the masses that nothing tells, and numbers without effect. If no physical robot keeps
-    them all, the first of these sets that leaves one is given up, each of the links in the way:
-    masses; numbers without effect; both. At last all numbers of all links are given up.
+    The candidates are masses that no torque determines, and numbers without effect. If no physical
+    robot keeps all of them, sets of numbers of the links that violate conditions are released in
+    this order, until a physical robot exists: masses; numbers without effect; both; finally all
+    numbers of all links.
 
     Returns the numbers that stay, bool, shape (p,), and the standard parameters of such a robot.
     """
@@ -461,7 +473,7 @@ def _held(part: Numbers, K: Array, rest: Array, u: Array, start: Array) -> tuple
 
 
 def _holding(part: Numbers, K: Array, rest: Array, u: Array, held: Array) -> Space:
-    """Return all chi with K chi = rest in which the numbers `held` are those of the file.
+    """Return all chi with K chi = rest in which the numbers `held` have the values of the file.
 
     Centres and tensors, which are no linear functions of chi, are linearised at u.
     """
@@ -472,7 +484,8 @@ def _holding(part: Numbers, K: Array, rest: Array, u: Array, held: Array) -> Spa
 
 
 def _linear(part: Numbers, u: Array) -> tuple[Array, Array]:
-    """Linearise the deviation from the file at u: (u(chi) - u0) / size = W chi - w.
+    """Linearise the deviation of the numbers u(chi) from those of the file, u0, at a given u:
+    (u(chi) - u0) / size = W chi - w.
 
     A link without mass has no centre; it is linearised at a mass of typical size.
     """
@@ -492,7 +505,7 @@ def _numbers(part: Numbers, chi: Array) -> Array:
 
 
 def _hold(part: Numbers, u: Array) -> Array:
-    """Set link and joint values without effect to those of the file.
+    """Reset link and joint values without effect to the values of the file.
 
     A value has no effect if no base parameter depends on it. If the values of the file violate a
     condition of a physical robot, the values in this condition stay.
@@ -505,10 +518,10 @@ def _hold(part: Numbers, u: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """Describe how far mass and centre of mass of a link are from the file's; "" if they are near.
+    """Describe how far mass and centre of mass of a link are from the file; "" if they are near.
 
-    They are near if the mass is within a factor STRANGE and the centre has moved by no more than
-    the size of the link.
+    They are near if the mass is within a factor of 2 (`STRANGE`) and the centre has moved by no
+    more than the size of the link.
     """
     before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
     m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))

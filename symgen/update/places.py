@@ -5,12 +5,12 @@ axes in which the file states the tensor, the numbers are
 
     mass M,    centre MS / M in the link frame,    I = R' (J - M (c'c 1 - c c')) R about the centre
 
-A URDF uses the axes of its <inertial>, which stay, and <dynamics> of a joint; it has no attribute
-for motor inertia, offsets and springs. An MJCF has fullinertia in axes of the body, or diaginertia
-with the orientation of its principal axes. A body whose inertia comes from its geoms gets an
-<inertial>; inertiafromgeom="true" becomes "auto", so that other bodies stay as they are. A class of
-defaults, which holds for many joints, is not changed: a joint that differs gets an attribute of its
-own.
+A URDF uses the axes of its <inertial>, which stay, and <dynamics> of a joint; a URDF has no
+attribute for motor inertia, offsets and springs. An MJCF has fullinertia in axes of the body, or
+diaginertia with the orientation of its principal axes. A body whose inertia comes from its geoms
+gets an <inertial>; inertiafromgeom="true" becomes "auto", so that other bodies stay as they are. A
+class of defaults, which holds for many joints, is not changed: a joint that differs gets an
+attribute of its own.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ class Attributes:
         URDF or MJCF.
     inertial : mapping
         For each child element of <inertial> ("" is <inertial> itself): its attributes, and the
-        index in NUMBERS of each number in them.
+        index of each number in them in the list `NUMBERS` (mass, centre, tensor).
     dynamics : str
-        The child element of a joint that holds its parameters; "" if the joint itself does.
+        The child element of a joint that contains its parameters; "" if the joint itself has them.
     joint : mapping
         The attribute of each family of joint parameters, such as damping for FV.
     """
@@ -83,7 +83,9 @@ class Attributes:
 
     @property
     def order(self) -> list[int]:
-        """Order of mass, centre of mass and inertia in the file, as indices into NUMBERS."""
+        """Order of mass, centre of mass and inertia in the file, as indices into the list
+        `NUMBERS`.
+        """
         return [k for row in self.inertial.values() for places in row.values() for k in places]
 
 
@@ -128,8 +130,9 @@ class LinkPlace:
     axes : ndarray, shape (3, 3)
         Orientation of the axes of the tensor in the link, as in the file or as compiled by MuJoCo.
     stated : ndarray, shape (10,), or None
-        NUMBERS as a URDF states them; None for an MJCF, whose numbers are compiled, unless the link
-        has no mass: its ten parameters do not contain its centre.
+        Mass, centre and tensor as a URDF states them; None for an MJCF, whose numbers are compiled.
+        A link without mass has these numbers even in an MJCF, because its ten parameters do not
+        contain its centre.
     """
 
     attributes: Attributes
@@ -149,7 +152,8 @@ class LinkPlace:
         """Convert ten inertial parameters in frame j to mass, centre of mass and tensor of the
         file.
 
-        The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of NUMBERS.
+        The argument has the order XX .. ZZ, MX, MY, MZ, M, the result the order of the list
+        `NUMBERS`.
         """
         if not np.any(ten):
             return np.zeros(10)
@@ -282,7 +286,9 @@ class Places:
         return None if without else self.attributes.joint.get(family)
 
     def heed_inertials(self, edits: XmlEdits) -> None:
-        """Set inertiafromgeom to "auto" in the file, so that MuJoCo uses an inserted <inertial>."""
+        """Set inertiafromgeom to "auto" in the file, so that MuJoCo uses the <inertial> that was
+        inserted.
+        """
         own = (e for body in self.links.values() for e in body.own("inertial"))
         ignored = next(own, None)
         if self.from_geoms and ignored is not None:
@@ -401,7 +407,9 @@ class FileLink:
 
     @property
     def numbers(self) -> Array:
-        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in NUMBERS."""
+        """Mass, centre of mass and inertia tensor in the file, shape (10,); order as in the list
+        `NUMBERS`.
+        """
         return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
 
 
@@ -414,7 +422,7 @@ class RobotText:
     file : str
         Name of the file.
     tree : Tree
-        Links and joints that are used: all of the file, or a chain of it.
+        Links and joints that are used: the whole file, or a chain in it.
     table : Table
         Khalil frames of `tree`.
     robot : Robot
@@ -430,7 +438,9 @@ class RobotText:
     places: Places
 
     def on(self, base: str) -> RobotText:
-        """Return the text as that of a robot with this base, whose link 0 may have parameters."""
+        """Return the same text for a robot whose base is `base`, so that link 0 has parameters if
+        the base is free.
+        """
         return replace(self, robot=on_base(self.robot, base))
 
     @property

@@ -140,7 +140,9 @@ class XmlEdits:
 
 
 def same(x: float, y: float) -> bool:
-    """Whether two numbers differ by no more than UNCHANGED of their size, or both are zero."""
+    """Whether two numbers differ by no more than 1e-9 of their size (`UNCHANGED`), or both are
+    zero.
+    """
     return abs(x - y) <= max(UNCHANGED * max(abs(x), abs(y)), ZERO)
 
 

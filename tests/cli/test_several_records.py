@@ -148,9 +148,9 @@ def test_cestac_takes_several(folder):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("one.yaml", "also.yaml"), "every record after the first must be one"),
+        (("one.yaml", "also.yaml"), "every record after the first must be a measured file"),
         (("one.yaml", "nothing.csv"), "no such file"),
-        (("a.csv", "planar"), "every record after the first must be one"),
+        (("a.csv", "planar"), "every record after the first must be a measured file"),
     ],
 )
 def test_refused(folder, arguments, said):

@@ -34,10 +34,11 @@ FOLDER = TemporaryDirectory()
 NOT_ASKED = "Not checked: a trial of another reading"
 
 MOTION = "of a motion"
-NO_SLIPS = "not judged for a robot with force sensors"
+NO_ADVICE = "advice on encoders of joints does not support force sensors"
+NO_SLIPS = "check of record and study does not support force sensors"
 REFUSED: Mapping[tuple[str, str], tuple[str, str]] = {
     ("force sensors", "advise"): (
-        "only encoders of joints",
+        NO_ADVICE,
         "an advice is the step of an encoder by joint; an axis of a sensor has no encoder",
     ),
     ("force sensors", "plausibility"): (
@@ -74,7 +75,7 @@ REFUSED: Mapping[tuple[str, str], tuple[str, str]] = {
 MISSING: Mapping[str, tuple[tuple[str, str], ...]] = {
     "force sensors": (
         (NO_SLIPS, "as above"),
-        ("only encoders of joints", "as above"),
+        (NO_ADVICE, "as above"),
     ),
     "poses at rest": (
         ("not judged for poses at rest", "as above"),

@@ -70,7 +70,7 @@ def test_every_call_has_the_force_sensors(tmp_path):
     assert alone.method == "wls"
     ranking = compare(case.model, {"as stated": (case.study, case.records, case.unseen)})
     assert ranking.mean_errors["as stated"] == pytest.approx(result.prediction_error, rel=0.1)
-    with pytest.raises(InputError, match="only encoders of joints"):
+    with pytest.raises(InputError, match="advice on encoders of joints does not support"):
         runtime.advise(case.model, case.records, case.study)
 
 

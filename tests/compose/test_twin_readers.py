@@ -123,7 +123,9 @@ def test_a_reader_that_reads_no_rounded_positions_says_so(monkeypatch):
     monkeypatch.setitem(compose.READERS, "smooth", Reader(lowpassed))
     model = arm()
     settings = study(signals={"reader": "smooth"})
-    with pytest.raises(SettingsError, match=r"cestac\.delta: .*smooth does not say how"):
+    with pytest.raises(
+        SettingsError, match=r"cestac\.delta: .*smooth cannot read rounded positions"
+    ):
         compose.cestac(model, [record(model, 0)], settings)
     torque = study(signals={"reader": "smooth"}, cestac={"delta": [], "torque": [0.1], "runs": 2})
     assert np.isfinite(compose.cestac(model, [record(model, 0)], torque).levels[0].mean).all()
@@ -135,9 +137,7 @@ def test_a_setting_of_another_reader_is_refused_by_the_list_of_readers(monkeypat
     model = arm()
     for key, value in {"step": 1e-3, "side": "motor"}.items():
         settings = study(signals={key: value})
-        said = (
-            f"signals.{key}: given, but reader is lowpass; set reader: counts or {TWIN}, or remove"
-        )
+        said = f"signals.{key}: the reader lowpass does not use this key; set reader: counts or {TWIN}, or remove"
         with pytest.raises(SettingsError, match=said):
             compose.problem(model, [record(model, 0)], settings)
     twin = study(signals={"reader": TWIN, "step": 1e-3})

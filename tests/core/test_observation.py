@@ -20,7 +20,7 @@ from runtime.compose import estimate_of, problem
 from runtime.core.essential import essential_of
 from runtime.core.model import BoundModel
 from runtime.core.record import Origin
-from runtime.core.rows.factor import factor
+from runtime.core.rows.factor import joint_factors
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import decimated_torque, observation_of
 from runtime.core.rows.regressor import Columns, distinct_entries
@@ -323,7 +323,8 @@ def test_rows_are_factored_once(record, monkeypatch):
     """Estimates, essential parameters and deviations read one factor."""
     calls = []
     monkeypatch.setattr(
-        "runtime.core.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
+        "runtime.core.rows.observation.joint_factors",
+        lambda *given: calls.append(1) or joint_factors(*given),
     )
     o = observe(planar, record, study())
     system = linear_system(o)

@@ -205,6 +205,38 @@ def test_equal_lengths_are_one_constant():
     assert str(robot.frame(4).d).lstrip("-") == str(robot.frame(5).d).lstrip("-") == "D4"
 
 
+@pytest.mark.parametrize("kind", ["fixed", "continuous"])
+def test_joints_that_move_are_counted(kind):
+    """Frames of a skin and of sensors are fixed joints, of which a humanoid has hundreds."""
+    frames = "".join(
+        f'<link name="s{k}"/><joint name="f{k}" type="{kind}"><parent link="arm"/><child link="s{k}"/></joint>'
+        for k in range(250)
+    )
+    body = '<link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint>'
+    text = f'<robot name="skin"><link name="base"/>{body}{joint}{frames}</robot>'
+    if kind == "fixed":
+        assert len(read_tree(text.encode(), "skin.urdf")[0].joints) == 1
+    else:
+        with pytest.raises(DescriptionError, match="251 joints that move; the limit is 200"):
+            read_tree(text.encode(), "skin.urdf")
+
+
+@pytest.mark.parametrize(
+    ("xyz", "remedy"),
+    [
+        ("${length} 0 0", "expand it first (xacro FILE > robot.urdf)"),
+        ("$(arg x) 0 0", "expand it first (xacro FILE > robot.urdf)"),
+        ("0.07, 0, -0.69", "put blanks in place of commas"),
+    ],
+)
+def test_numbers_of_another_notation_name_the_remedy(xyz, remedy):
+    link = '<link name="base"/><link name="arm"/>'
+    joint = f'<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="{xyz}"/></joint>'
+    with pytest.raises(DescriptionError, match=re.escape(remedy)):
+        read_tree(f'<robot name="r">{link}{joint}</robot>'.encode(), "r.urdf")
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_mangled_files_raise_nothing_else(data):

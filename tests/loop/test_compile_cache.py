@@ -131,10 +131,10 @@ def test_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("compiler", "reason"),
     [
-        ("false", "failed with 1"),
+        ("false", "failed with exit code 1"),
         ("gcc -ffast-math", "arithmetic"),
         ("gcc --no-such-flag", "failed"),
-        ("true", "failed with 0"),
+        ("true", "failed with exit code 0"),
     ],
 )
 def test_a_compiler_that_fails(

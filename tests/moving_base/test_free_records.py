@@ -190,7 +190,7 @@ def test_what_a_free_base_needs_is_said_in_one_sentence(case):
     with pytest.raises(InputError, match="not possible for ur5, whose base moves"):
         runtime.excite(module)
     record = runtime.Record(t, q, tau[:, 6:], channels=motion | {"wrench0": tau[:, :6]})
-    with pytest.raises(InputError, match="a study with a free base is not repaired"):
+    with pytest.raises(InputError, match="repair of a study does not support a free base"):
         runtime.repair(module, record)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -630,3 +631,21 @@ def test_degrees_that_the_study_states_are_not_guessed_again(unit, asked) -> Non
     assert check.state == "no"
     assert ("degrees read as rad?" in check.remedy) is asked
     assert "side" in check.remedy
+
+
+def test_positions_beyond_the_limits_are_told_with_these_limits() -> None:
+    """Of a joint that may reach 0.2 rad, "largest values: 1.02 rad" does not say what is wrong."""
+    model = symgen.model("planar_2r")
+    t, q, tau = motion(model)
+    low, high = float(q[:, 1].min()), float(q[:, 1].max())
+    middle = (low + high) / 2
+    limits = {"q": ((-4.0, 4.0), (middle, high)), "qd": (1e-2, 1e3)}
+    bounded = SimpleNamespace(**{**vars(model), "LIMITS": limits})
+    record = runtime.Record(t, q, tau, name="run")
+    checks = {c.question: c for c in runtime.plausibility(bounded, record).checks()}
+    at = checks["Are the positions those of this robot?"]
+    assert at.state != "good"
+    reached, bound = re.search(r"values: (\S+) rad \(joint 2, limit (\S+)\)$", at.finding).groups()
+    assert float(reached) == pytest.approx(low, rel=5e-3)
+    assert float(bound) == pytest.approx(middle, abs=5e-3)
+    assert "(joint 1, limit 0.01)" in checks["Are the speeds those of this robot?"].finding

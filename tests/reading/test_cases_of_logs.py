@@ -255,3 +255,21 @@ def test_episodes_are_records(tmp_path: Path) -> None:
     assert resample is not None
     assert (resample.method, resample.gaps, resample.rate) == ("count", "split", 200)
     assert value(text, "MX2") == pytest.approx(0.100, abs=1e-3)
+
+
+def test_objects_of_motors_in_a_list(tmp_path) -> None:
+    """A log of one object per motor: its values are arrays, as if there were a list of each."""
+    path, q = tmp_path / "log.jsonl", np.random.default_rng(0).normal(size=(4, 3))
+    lines = [
+        {"stamp": k, "motors": [{"q": float(x), "state": {"tau": -float(x)}} for x in row]}
+        for k, row in enumerate(q)
+    ]
+    path.write_text("\n".join(map(json.dumps, lines)))
+    table = read_table(path)
+    assert table.names == ("stamp", "motors.q", "motors.state.tau")
+    np.testing.assert_array_equal(table.columns["motors.q"], q)
+    np.testing.assert_array_equal(table.columns["motors.state.tau"], -q)
+    lines[2]["motors"][1] = {"state": {"tau": 0.0}}
+    path.write_text("\n".join(map(json.dumps, lines)))
+    with pytest.raises(InputError, match=r"column 'motors\.q', line 3"):
+        read_table(path).read(["motors.q"])

@@ -78,3 +78,62 @@ def test_what_is_wrong_is_told_by_line(tmp_path, damage, words):
     with pytest.raises(InputError) as e:
         read_record(written(tmp_path / "run.csv", lines))
     assert all(word in str(e.value) for word in words.split(": "))
+
+
+def numbers(count: int = 5) -> list[str]:
+    return [f"{k / 100},{np.sin(k):.9f},{np.cos(k):.9f}" for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        ["# t,q1,tau1"],  # as numpy.savetxt writes it
+        ["# a remark, of two parts", "#t, q1, tau1"],
+        ["% t,q1,tau1"],
+        ["% a remark", "t,q1,tau1"],
+        ["sep=,", "t,q1,tau1"],
+        ["sep=,", "% a remark", '"t","q1","tau1"'],
+    ],
+)
+def test_names_of_columns_above_the_numbers(tmp_path, head):
+    table = read_table(written(tmp_path / "run.csv", [*head, *numbers()]))
+    assert table.names == ("t", "q1", "tau1") and len(table.columns["q1"]) == 5
+
+
+@pytest.mark.parametrize("remark", ["# a remark", "# t,q1", "# t,q1,q1", "# 1,2,3", "#", "%"])
+def test_a_remark_is_no_header(tmp_path, remark):
+    table = read_table(written(tmp_path / "run.csv", [remark, *numbers()]))
+    assert table.names == ("1", "2", "3") and len(table.columns["3"]) == 5
+
+
+def test_a_column_has_its_number_beside_its_name(tmp_path):
+    """Numbers in a study mean the same columns, whether or not the file has names for them."""
+    bare = written(tmp_path / "bare.csv", numbers())
+    for head in (["t,q1,tau1"], ["# t,q1,tau1"]):
+        table = read_table(written(tmp_path / "named.csv", [*head, *numbers()]))
+        names = ["3", "1"]
+        assert table.read(names).tobytes() == read_table(bare).read(names).tobytes()
+        with pytest.raises(InputError, match="no column 4"):
+            table.read(["4"])
+    named_two = written(tmp_path / "two.csv", ["2,q1,tau1", *numbers()])
+    two = read_table(named_two)
+    assert (two.read(["2"]) == two.columns["2"][:, None]).all()  # a name goes before a number
+
+
+def test_a_field_in_quotation_marks_may_contain_the_separator(tmp_path):
+    lines = ['t,"q, measured",tau1,note', *(f'{line},"arm {k}, run"' for k, line in enumerate(numbers()))]  # fmt: skip
+    table = read_table(written(tmp_path / "run.csv", lines))
+    assert table.names == ("t", "q, measured", "tau1", "note")
+    plain = read_table(written(tmp_path / "plain.csv", ["t,q,tau1", *numbers()]))
+    for name, other in (("q, measured", "q"), ("tau1", "tau1")):
+        assert table.columns[name].tobytes() == plain.columns[other].tobytes()
+    with pytest.raises(InputError, match=r"column 'note', line 2: 'arm 0, run'; expected a number"):
+        table.read(["note"])
+
+
+def test_a_file_of_zeros_is_told_in_one_sentence(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_bytes(bytes(100_000))
+    with pytest.raises(InputError, match=r"not a text file.*zeros") as e:
+        read_table(path)
+    assert len(str(e.value)) < 200

@@ -17,7 +17,7 @@ from runtime.compose import problem, records_of
 from runtime.ground.errors import InputError, SettingsError
 from runtime.ground.settings import structure, to_mapping
 from runtime.mending import repair as mending
-from runtime.mending.edits import angle_text
+from runtime.mending.edits import angle_text, delayed
 from runtime.mending.reading import Reading, record_of
 from runtime.mending.settings import digest
 from runtime.plausible.causes import CAUSES, NUMBERS, Cause, Robot
@@ -130,19 +130,22 @@ def test_written_causes_are_read_back(start: Any) -> None:
 
 
 def test_pairs_of_causes_are_read_back(start: Any) -> None:
-    """Changes of several kinds, one after the other: order, units, side, table, delay."""
+    """Changes of several kinds, one after the other: order, units, rate, table, delay."""
     first, robot, _, folder = start
     record = first.data.case.records[0]
     rng = np.random.default_rng(5)
-    made = 0
+    made = slower = 0
     for _ in range(60):
         reading: Any = first
-        for _ in range(3):
+        late = rng.integers(6)  # before a change, after all of them, or never
+        for k in range(4):
+            if k == late:
+                reading = reading.late(np.array([0.0, 0.01, -0.02]) / reading.rate, "late")
             causes = [c for c in causes_of(reading) if c.kind not in ("side", "coupling")]
-            changed = reading.changed(causes[rng.integers(len(causes))])
-            reading = changed if changed is not None and changed.rate == first.rate else reading
-        if rng.uniform() < 0.5:
-            reading = reading.late(np.array([0.0, 0.01, -0.02]), "late")
+            if k == 3 or (changed := reading.changed(causes[rng.integers(len(causes))])) is None:
+                continue
+            slower += k > late and changed.rate != reading.rate
+            reading = changed
         again, corrected = read_again(reading, robot, folder)
         meant = record_of(reading, record)
         scale = np.abs(meant.tau).max(axis=0)
@@ -150,7 +153,7 @@ def test_pairs_of_causes_are_read_back(start: Any) -> None:
         np.testing.assert_allclose(again.tau / scale, meant.tau / scale, rtol=1e-7, atol=1e-7)
         same_table(corrected, reading)
         made += len(reading.steps) > 1
-    assert made > 30
+    assert made > 30 and slower > 0
 
 
 def test_samples_are_those_of_the_record_read_again(start: Any) -> None:
@@ -218,3 +221,18 @@ def test_delays_are_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="in s"):
         runtime.read_record(replace(study.record[0], delay=20.0))
     assert RATE == 200
+
+
+def test_a_delay_that_the_study_gives_stays(start: Any) -> None:
+    """A found delay is added to it, another order moves it, and another rate shortens it."""
+    first, *_ = start
+    study = delayed(first.study, np.array([0.01, 0.02, 0.03]))
+    given = replace(first, study=study)
+    assert given.late(np.full(3, 0.005), "").study["record"][0]["delay"] == [0.015, 0.025, 0.035]
+    for cause in causes_of(given):
+        reading = given.changed(cause)
+        if reading is None or cause.kind not in ("rate", "exchange"):
+            continue
+        order = np.abs(cause.T).argmax(axis=1)
+        want = np.array([0.01, 0.02, 0.03])[order] / cause.rate
+        np.testing.assert_allclose(reading.study["record"][0]["delay"], want, rtol=1e-9)

@@ -14,7 +14,12 @@ from typer.testing import CliRunner
 
 import runtime
 import symgen
-from runtime.compose import records_of
+from runtime.compose import problem, records_of
+from runtime.ground.settings import to_mapping
+from runtime.mending import repair as mending
+from runtime.mending.reading import Reading
+from runtime.mending.search import Search, further
+from runtime.plausible.plausibility import case_of
 from runtime.study import load_study, located, study_from_mapping
 from symgen.cli.main import app
 from symgen.description.yaml import parse_robot
@@ -191,29 +196,48 @@ def test_pieces_between_gaps_are_refused(made: Any, tmp_path: Path) -> None:
         runtime.repair(made[0], records, study, variants=made[1])
 
 
+def given(made: tuple[Any, Any], t: Any, q: Any, tau: Any) -> Any:
+    """The reading of a record by a study without settings."""
+    model, variants = made
+    study = study_from_mapping({"record": [{}]})
+    whole = problem(model, runtime.Record(t, q, tau), study)
+    case = case_of(whole, variants)
+    data = mending.data_of(case, whole, to_mapping(study), lambda record: ((), ()), RATE)
+    return Reading.given(data, to_mapping(study))
+
+
 def test_blocks_set_aside_do_not_matter_to_the_search(made: Any) -> None:
     """Another torque in the blocks set aside changes what is judged, and nothing that is found."""
-    from runtime.compose import problem
-    from runtime.ground.settings import to_mapping
-    from runtime.mending import repair as mending
-    from runtime.mending.reading import Reading
-    from runtime.mending.search import search
-    from runtime.plausible.plausibility import case_of
-    from runtime.reading.settings import RecordSettings
-
     t, q, tau = recorded(12)
-    study = study_from_mapping({"record": [{}]})
-    assert study.record == (RecordSettings(),)
-    model, variants = made
     numbers = []
     for factor in (1.0, 3.0):
-        whole = problem(model, runtime.Record(t, q, tau * (1, -1, 1)), study)
-        data = mending.data_of(
-            case_of(whole, variants), whole, to_mapping(study), lambda record: ((), ()), RATE
-        )
+        start = given(made, t, q, tau * (1, -1, 1))
+        data = start.data
         other = np.where(data.aside[:, None], factor, 1.0) * data.samples.tau
         data = replace(data, samples=replace(data.samples, tau=other))
-        found = search(Reading.given(data, to_mapping(study)), lambda: 0.0)
-        numbers.append((found.best.key, found.best.error, found.best.unseen_error))
+        found = Search(replace(start, data=data), lambda: 0.0)
+        found.from_start()
+        best = found.settled(found.best)
+        numbers.append((best.key, best.error, best.unseen_error))
     assert numbers[0][:2] == numbers[1][:2]
     assert numbers[1][2] > 20 * numbers[0][2]
+
+
+def test_a_rate_is_named_beside_reversed_torques(made: Any) -> None:
+    """Reversed gravity torques are no reason against another rate once they are mended."""
+    t, q, tau = recorded(22)
+    start = given(made, t / 2, q, tau * (1, -1, -1))
+    signs = [one for one in further(start)[0] if one.steps[0].kind == "sign"]
+    mended = next(one for one in signs if list(np.diag(one.T)) == [1, -1, -1])
+    assert {one.rate for one in further(mended)[0] if one.steps[-1].named} >= {0.5}
+
+
+def test_numbers_are_searched_again_beside_the_other_changes(made: Any) -> None:
+    """The zero that fits a late record best is another one: it is found again with the delay."""
+    t, q, tau = recorded(22)
+    k = 7
+    repair = repaired(made, t[k:], q[k:] - np.array([0, 0.5, 0]), tau[:-k])
+    changed = {change.path[-1]: change.after for change in repair.changes}
+    assert repair.kept and changed.keys() == {"delay", "theta"}
+    assert changed["delay"] == pytest.approx(k / RATE, abs=1e-3)
+    assert float(changed["theta"].removeprefix("q2 +")) == pytest.approx(0.5, abs=0.03)

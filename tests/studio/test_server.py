@@ -371,6 +371,48 @@ def test_what_a_classic_table_cannot_have_is_one_sentence(
     assert (studio.path / "robot.yaml").read_text() == CLASSIC
 
 
+BODY = (
+    '<inertial><origin xyz="0.1 0 0"/><mass value="1"/><inertia ixx="0.001" ixy="0" ixz="0" iyy="0.008" '
+    'iyz="0" izz="0.008"/></inertial>'
+)
+BARS = (
+    '<robot name="bars"><link name="base"/>'
+    + "".join(f'<link name="{link}">{BODY}</link>' for link in ("crank", "rod", "rocker"))
+    + "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{x} 0 0"/><axis xyz="0 1 0"/></joint>'
+        for k, (parent, child, x) in enumerate(
+            (("base", "crank", 0), ("crank", "rod", 0.1), ("base", "rocker", 0.3)), start=1
+        )
+    )
+    + "</robot>"
+)
+
+
+def test_loops_beside_a_urdf_are_taken(studio: Any, tmp_path: Path) -> None:
+    """Dropped after their URDF, or beside the one of the command line; undo takes them away."""
+    hinge = "loops: [{links: [rod, rocker], points: [[0.3, 0, 0], [0.2, 0, 0]], axis: [0, 1, 0]}]\n"
+    loops = (hinge + "actuated: [j1]\n").encode()
+    refused = studio.upload("robot", "bars.loops.yaml", loops)
+    assert refused.status_code == 422 and "drop that first" in refused.text
+    (tmp_path / "bars.urdf").write_text(BARS)
+    studio.upload("robot", "bars.urdf", BARS.encode())
+    wrong = studio.upload("robot", "bars.loops.yaml", loops.replace(b"rocker]", b"other]"))
+    assert wrong.status_code == 422 and "other" in wrong.text
+    assert {path.name for path in studio.path.glob("robot.*")} == {"robot.urdf"}
+    assert studio.upload("robot", "bars.loops.yaml", loops).status_code == 200
+    (tmp_path / "bars.loops.yaml").write_bytes(loops)
+    expected = symgen.load_robot(tmp_path / "bars.urdf")
+    taken = symgen.load_robot(studio.server.folder.robot)
+    assert taken.loops == expected.loops and len(taken.loops) == 1
+    assert symgen.load_robot(studio.path / "robot.urdf").loops == taken.loops  # for `symgen apply`
+    beside = WorkFolder(tmp_path / "beside")
+    beside.take_robot_of(str(tmp_path / "bars.urdf"))
+    assert symgen.load_robot(beside.robot).loops == taken.loops
+    studio.post("undo", {"digest": studio.server.folder.digest})
+    assert {path.name for path in studio.path.glob("robot.*")} == {"robot.urdf"}
+
+
 def test_an_angle_that_is_rounded_is_no_warning(studio: Any) -> None:
     joint = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
     origin = '<origin rpy="1.57079634 0 0"/><limit effort="1" velocity="1"/></joint>'

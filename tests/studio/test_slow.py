@@ -111,7 +111,7 @@ def test_a_wrong_file_leaves_the_record_and_undo_brings_it_back(
         go(page, studio.address + "record")
         answering(page, "true")
         give(page, "#record-file", tmp_path / name)
-        until(page, f"{MESSAGE}.includes('the record before stays')")
+        until(page, f"{MESSAGE}.includes('the earlier record stays in use')")
         assert page.run("asked.length") == 1
         assert (studio.work / "record/run.csv").read_bytes() == kept
         assert (studio.work / "study.yaml").read_text() == study

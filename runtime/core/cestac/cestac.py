@@ -127,8 +127,8 @@ def cestac(
     name = study.signals.reader
     if settings.delta and not problem.reader.reads_rounded:
         raise SettingsError(
-            f"steps, but signals.reader: {name} does not say how it reads rounded positions; set "
-            "another reader, or delta: []",
+            f"signals.reader: {name} cannot read rounded positions; set another reader, or "
+            "delta: []",
             path=("cestac", "delta"),
         )
     if problem.reader.encoder is not None and settings.delta and settings.rounding != "phase":
@@ -251,9 +251,9 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
     """Group the runs of a study of encoder resolution into tasks for worker processes.
 
     A task holds successive runs of one level, or of all levels if these share their random numbers.
-    It has at most LIMIT.TASK_RUNS runs, or one run of every level if there are more levels than
-    that. A study with few runs has smaller tasks, so that every worker gets some. The tasks do not
-    depend on the number of workers.
+    The number of runs in a task is limited (TASK_RUNS in limits.toml); a task of all levels has at
+    least one run of each. A study with few runs has smaller tasks, so that every worker gets some.
+    The tasks do not depend on the number of workers.
     """
     size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 

@@ -132,7 +132,8 @@ def prepared_record(
     selected by the measured velocities, unless `own` has selected rows.
 
     own_encoder : function that returns the encoder that measured the record, or None.
-    exact : whether encoders are studied, beside whose steps the positions of counts are exact.
+    exact : whether the study has encoder steps so coarse that recorded counts are exact in
+      comparison.
     """
     study = study_of_record(study, own.record)
     signals = replace(study.signals, median=study.cestac.median)
@@ -157,8 +158,8 @@ def _reader_of_measured(
 ) -> tuple[Reader, str]:
     """Return the reader of a measured record, and a note if its positions count as exact.
 
-    Beside coarser steps, positions of counts are exact, unless the study gives their step, some are
-    missing, or the study needs the counts of the record itself.
+    In comparison with coarser steps, positions from counts are exact, unless the study gives their
+    step, some are missing, or the study needs the counts of the record itself.
     """
     reader, side = own.reader, study.cestac.side
     known = reader.encoder is None or reader.encoder(study.signals)[0] is not None
@@ -217,8 +218,8 @@ def study_columns(
 def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
     """Build the system Y = W X + rho of the measured records, without any rounding.
 
-    If the study reads encoder counts of unknown step and the positions are no counts, they count as
-    exact.
+    If the study reads encoder counts of unknown step and the positions are no counts, the positions
+    are taken as exact.
     """
     reader = problem.reader
     try:
@@ -233,7 +234,7 @@ def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the keys of two random generators for record k: for its positions, for its torques.
 
-    They are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
+    The keys are (*draw, 2 k) and (*draw, 2 k + 1); the positions of record 0 have the key `draw`
     itself.
     """
     return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
@@ -288,7 +289,7 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
 def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
     """Build the system Y = W X + rho of one CESTAC run, from measurements rounded at random.
 
-    Without steps, it is the system of the measurements.
+    Without steps, the system is that of the measurements.
 
     draw : numbers that identify the random draw.
     """
@@ -310,8 +311,8 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
 def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
     """Build the system Y = W X + rho of the records without rounding, as reference of the study.
 
-    It is the system of a run without steps if a loop is simulated, or if the positions of a record
-    count as exact.
+    The reference is the system of a run without steps if a loop is simulated, or if the positions
+    of a record count as exact.
     """
     if task.loop is not None or any(record.note for record in task.records):
         return perturbed(task.columns, task, Level(0.0), ())
@@ -367,7 +368,7 @@ def system_of(
     """Build the system Y = W X + rho of all records from positions and torques of each record.
 
     positions : shape (N, n) each. torques : rows of Y, shape (n, K) each.
-    level : steps that the reader is told; default: none, positions as they are.
+    level : steps that the reader gets; default: none, and positions are used as they are.
     """
     observations = [
         observation_of(

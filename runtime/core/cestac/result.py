@@ -18,20 +18,21 @@ As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the
 to ||Y|| has the printed order of magnitude.
 
 By the chapter, the estimate is practically unbiased if the effect of the encoder is negligible
-against model errors and noise of the torques: %e (21) below 1 %; above 5 % it is biased. What model
-errors and noise do to a parameter is its 95 % interval +-h, in %, corrected for slow residuals. So a
-change counts in units of what is negligible for the parameter,
+against model errors and noise of the torques: %e (21) below 1 %; above 5 % it is biased. The effect
+of model errors and noise on a parameter is its 95 % interval +-h, in %, corrected for slow
+residuals. So a change is divided by what is negligible for the parameter,
 
     weighed = %e / max(1 %, h/10),
 
-and the verdict is "practically unbiased" if this number is below 1 for all parameters asked for,
-"biased" if it is above 5 for one of them, and "doubtful" between. A biased parameter changes by more
-than 5 % and by more than h/2, about its standard deviation. With normal errors, a bias of h/10
+and the verdict is "practically unbiased" if this number is below 1 for all requested parameters,
+"biased" if it is above 5 for one of them, and "doubtful" between. A biased parameter changes by
+more than 5 % and by more than h/2, about its standard deviation. With normal errors, a bias of h/10
 leaves 94.5 % of the 95 % intervals right, a bias of h/2 83 %. `chapter_verdict` has the limits 1 %
-and 5 % alone, for all parameters asked for whose %sigma (11) is at most LIMIT.MAIN: the chapter
-excepts MX3, OFFSET4 and OFFSET6, which "do not contribute significantly". Its section 4.1.4 calls the residual (22) the best
-single indicator, because it covers the whole model: `residual_verdict` applies the same two limits
-to its increase. The residual hardly sees a parameter on which the torques depend little.
+and 5 % alone, for all requested parameters whose %sigma (11) is at most 10 % (MAIN in limits.toml):
+the chapter excepts MX3, OFFSET4 and OFFSET6, which "do not contribute significantly". Its section
+4.1.4 calls the residual (22) the best single indicator, because it covers the whole model:
+`residual_verdict` applies the same two limits to its increase. The residual hardly sees a parameter
+on which the torques depend little.
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ class LevelResult:
     residual_verdict : str
         Verdict of `increase` alone.
     decided_by : mapping of float, %
-        e of the parameters that decided the verdict, by name, the largest `weighed` first.
+        Changes %e of the parameters that decided the verdict, by name, the largest `weighed` first.
     runs_needed : int
         Number of runs that makes the Student intervals of the deciding parameters narrower than
         what is negligible for them.
@@ -190,7 +191,7 @@ class Cestac(Result, Part):
     def deciding(self) -> tuple[str, ...]:
         """Names of the parameters that decide the verdict: those that study.cestac.columns names.
 
-        All of them if it is "essential" or "all".
+        They are all parameters if it is "essential" or "all".
         """
         return deciding_names(self.reference)
 
@@ -221,7 +222,7 @@ class Cestac(Result, Part):
     def enough(self) -> Level | None:
         """Coarsest encoder step such that this step and all finer ones leave the estimate unbiased.
 
-        None if the finest step is not practically unbiased.
+        The value is None if the finest step is not practically unbiased.
         """
         finest_first = sorted(self.encoder_steps, key=lambda r: r.level.delta)
         fine = list(takewhile(lambda r: r.verdict == "unbiased", finest_first))
@@ -331,9 +332,9 @@ class Cestac(Result, Part):
     def error_table(self) -> Table:
         """Return the table of errors %e, eq. (21), and %sigma, eq. (20), at every rounding step.
 
-        It has one line per parameter, with half of its 95 % interval, corrected for slow residuals;
-        `*` marks parameters that do not decide the verdict, "-" parameters whose interval contains
-        zero.
+        The table has one line per parameter, with half of its 95 % interval, corrected for slow
+        residuals; `*` marks parameters that do not decide the verdict, "-" parameters whose
+        interval contains zero.
         """
         reference = self.reference
         own = reference.relative_deviation
@@ -356,7 +357,7 @@ class Cestac(Result, Part):
     def residual_table(self) -> Table:
         """Return the table of residual errors and verdicts, with one column per rounding step.
 
-        It has both forms of %e(rho), the increase of the residual norm, and the verdicts.
+        The table has both forms of %e(rho), the increase of the residual norm, and the verdicts.
         """
         levels = self.levels
         rows = [
@@ -532,7 +533,7 @@ def names_judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Return the parameters that decide the verdict: those that study.cestac.columns asks for."""
+    """Return the parameters that decide the verdict: those that study.cestac.columns names."""
     return tuple(reference.provenance.get(JUDGED, reference.names))
 
 
@@ -543,7 +544,7 @@ def known_names(reference: Estimate) -> tuple[str, ...]:
 
 
 def main_columns(reference: Estimate) -> list[int]:
-    """Find the numbers of the main parameters asked for: %sigma, eq. (11), is at most LIMIT.MAIN."""
+    """Find the indices of the requested parameters with %sigma, eq. (11), of at most 10 %."""
     asked = deciding_names(reference)
     return [
         i
@@ -565,8 +566,8 @@ def negligible(reference: Estimate) -> Vector:
 def weighed_change(change: Array, reference: Estimate) -> Array:
     """Divide changes of the parameters, shape (..., b), %, by what is negligible for each.
 
-    The limits of the result are those of the chapter: 1, and 5 for a bias. nan for a value of
-    exactly zero.
+    The limits of the result are those of the chapter: 1, and 5 for a bias. A value of
+    exactly zero gives nan.
     """
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(change) / negligible(reference))
@@ -631,7 +632,7 @@ def level_result(
 
 
 def runs_needed(spread: float) -> int:
-    """Find how many runs give means whose Student intervals are negligible.
+    """Find how many runs give means whose Student intervals are negligible for the parameter.
 
     spread : standard deviation of the runs, in units of what is negligible for the parameter.
     """

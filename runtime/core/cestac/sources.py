@@ -1,7 +1,7 @@
 """Interfaces of the objects that a study of encoders gets from other packages.
 
-They are the encoder that measured a record, a closed loop that is simulated again in each run, and
-a store of runs on disk.
+The objects are the encoder that measured a record, a closed loop that is simulated again in each
+run, and a store of runs on disk.
 """
 
 from __future__ import annotations

@@ -14,17 +14,18 @@ reduced them: sigma is 0.8 of the scatter with 60 parameters and 50 blocks. (1 -
 place (CR2) is exact for independent residuals and too small for correlated ones, for which blocks
 are used.
 
-Friction that the model lacks errs alike in every block of time, since each has the same strokes.
-So the rows of every joint are divided again, into bands with equally many rows: bands of its speed
-|qd_j|, of its load |W_j X|, of its position q_j, and of its way since the last reversal, which
-shows hysteresis. The jackknife over the bands of speed leaves out slow or fast motion, and so on;
-few and unequal bands make it larger than (10) for independent residuals too, by
+Friction that the model lacks causes the same error in every block of time, because every block has
+the same strokes. So the rows of every joint are divided again, into bands with equally many rows:
+bands of its speed |qd_j|, of its load |W_j X|, of its position q_j, and of its way since the last
+reversal, which shows hysteresis. The jackknife over the bands of speed leaves out slow or fast
+motion, and so on; few and unequal bands make it larger than (10) for independent residuals too, by
 diag(C_0)/diag(T T'):
 
     C_v = (K - 1)/K  sum_k u_k u_k',        C_0 = (K - 1)/K  sum_k T G_k (1 - G_k)^-1 T',
             v = diag(C_v) diag(T T')/diag(C_0)
 
-The corrected variance is diag(C_b), or the largest v where it is larger by LIMIT.BANDS_SHOW.
+The corrected variance is diag(C_b), or the largest v where that is clearly larger (BANDS_SHOW of
+the limits).
 
 References: Bell and McCaffrey (2002) for (1 - G_k); MacKinnon, Nielsen and Webb (2023), CV3, for
 the jackknife; Kunsch (1989) for drawn blocks.
@@ -43,7 +44,7 @@ from runtime.ground.limits import LIMIT
 def block_covariance(blocks: Iterable[Array], X: Array, T: Array) -> Array:
     """Compute the jackknife covariance of X over blocks of time, shape (b, b).
 
-    nan for fewer than two blocks, and for a parameter that only one block determines.
+    Entries are nan for fewer than two blocks, and for a parameter that only one block determines.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def corrected_deviations(
     friction.
 
     The deviations come from the jackknife over blocks of time; over one kind of bands where that
-    deviation is clearly larger. nan where only one block determines a parameter.
+    deviation is clearly larger. A deviation is nan if only one block determines the parameter.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def corrected_deviations(
 def band_variances(bands: Iterable[Array], X: Array, T: Array) -> Array:
     """Compute the variances of X, shape (b,), by a jackknife over bands of one kind.
 
-    They are v = diag(C_v) diag(T T')/diag(C_0), and about zero for one band. The parameters are
-    those of `block_covariance`.
+    The variances are v = diag(C_v) diag(T T')/diag(C_0), and about zero for one band. The
+    parameters are those of `block_covariance`.
     """
     squares, independent = np.zeros(len(T)), np.zeros(len(T))
     for rows in bands:

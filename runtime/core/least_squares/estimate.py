@@ -199,7 +199,8 @@ class Estimate:
     def worst_joint(self) -> JointFit:
         """Fit of the joint with the largest relative error, of joints with a motor and rows in W.
 
-        If there is no such joint, an axis of a force sensor; it may measure only its noise.
+        If there is no such joint, the result is the fit of an axis of a force sensor, which may
+        measure only noise.
         """
         return max(
             self.per_joint, key=lambda fit: (fit.has_motor, not fit.is_axis, fit.relative_error)

@@ -128,7 +128,7 @@ class System:
     def band_rows(self, X: Array) -> Iterator[Iterator[Array]]:
         """Yield the weighted rows [W Y] band by band, for each kind of band (`Observation.bands`).
 
-        Shape (rows, b + 1) each; the load is that of the parameters X.
+        Each band has the shape (rows, b + 1); the bands of load use the torques W X.
         """
         return self.observation.band_rows(
             self.names, 1 / np.array(self.scales), X, self.row_covariance
@@ -142,7 +142,7 @@ def ordinary(
 
     X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
 
-    SettingsError if `settings` names a column that the observation lacks.
+    Raise SettingsError if `settings` names a column that the observation lacks.
     """
     names = observation.names if settings.columns == "all" else tuple(settings.columns)
     if unknown := [name for name in names if name not in observation.names]:

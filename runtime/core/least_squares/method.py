@@ -1,7 +1,7 @@
 """Definition of an estimation method: its options, its first least squares, and its fit.
 
     start = rows(observation, settings, options)     least squares, solved once for every method
-    fitted = fit(start)                              the result of the method; None: nothing more
+    fitted = fit(start)                              the result of the method; None: the start is the result
 
 A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`), the only
 place with its name. Other code asks what a Method says of itself: whether it is linear, weighs rows
@@ -95,7 +95,7 @@ class Method:
         Function that weighs the rows for the least squares from which the method starts.
     fit : callable or None
         Function that computes the result of the method from this start; None: the result is that of
-        these least squares, which need no single row.
+        the least squares, which need no single row.
     weights : tuple of str
         Values of estimate.weights that the method accepts.
     observe : callable or None
@@ -110,7 +110,7 @@ class Method:
         the physical set of an identification (`runtime.core.parameter_sets`).
     rounding : str
         Sentence of the method on a study that rounds recorded positions (CESTAC), with {method} for
-        its name; "" for nothing to say.
+        its name; "" if no sentence is needed.
     intervals : str
         What is known of its 95 % intervals if they do not hold 95 % of the true values; "" if they do.
     """
@@ -139,7 +139,7 @@ class Method:
     def checked(self, settings: EstimateSettings) -> Any:
         """Check options and weights of the settings for this method, and return the options.
 
-        SettingsError if they do not suit.
+        Raise SettingsError if they do not suit the method.
         """
         message = (
             f"{settings.weights!r} with method {settings.method}; expected "
@@ -163,7 +163,7 @@ Methods: TypeAlias = Mapping[str, Method]
 
 
 def method_of(settings: EstimateSettings, methods: Methods) -> Method:
-    """Return the method of estimation that `settings` names; SettingsError if it is unknown."""
+    """Return the method of estimation that `settings` names; raise SettingsError if it is unknown."""
     if settings.method not in methods:
         raise SettingsError(
             f"unknown method {settings.method!r}; expected {' or '.join(methods)}",

@@ -35,7 +35,7 @@ class Solution:
     T : ndarray, shape (b, rank)
         T T' = (W'W)^-1, on the determined directions when rank < b.
     residual_norm : float
-        ||Y - W X|| of the factored system, weighted if its rows are.
+        ||Y - W X|| of the factored system, weighted if the rows of the system are.
     rank : int
         Numerical rank of W with unit columns.
     cond_unit : float
@@ -65,7 +65,7 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 def rank_tolerance(factor: Factor) -> float:
     """Compute the default limit of s_i/s_1 above which a singular value s_i counts in the rank.
 
-    It is the number of rows times the unit round-off.
+    The limit is the number of rows times the unit round-off.
     """
     return float(max(factor.rows, len(factor.names)) * np.finfo(float).eps)
 
@@ -97,7 +97,8 @@ def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]
     """Group the parameters that the record cannot separate, from the null space of W.
 
     V2t, shape (b - rank, b), has the null directions as orthonormal rows. A group contains names
-    whose entries of P = V_2 V_2' (diagonal: its square root) exceed LIMIT.NULL_PARTICIPATION.
+    whose entries of P = V_2 V_2' (diagonal: its square root) are not nearly zero (above
+    NULL_PARTICIPATION in limits.toml).
     """
     P = V2t.T @ V2t
     part = np.flatnonzero(np.sqrt(np.diag(P)) > LIMIT.NULL_PARTICIPATION)

@@ -10,7 +10,7 @@ s_j is a standard deviation in N m. The setting `weights` chooses how it is comp
                 every s_j changes by less than 1e-3.
     covariance  residuals e of ordinary least squares; Omega_ij = sum e_i e_j/(N_ij - b/n) over the
                 N_ij instants with rows of both joints; the rows of one instant are multiplied by
-                L^-1, L L' = Omega of the joints that have a row at it.
+                L^-1, L L' = Omega of the joints that have a row at that instant.
 
 The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
 """
@@ -37,7 +37,7 @@ def weighted(
     """Weight the rows for the method wls, in which `weights: none` means one weight for each joint.
 
     The name of the method, wls, promises weights. s_j is computed from joint j alone, or from the
-    common least squares if joint j has too few rows. It is never zero.
+    common least squares if joint j has too few rows. The weight s_j is never zero.
     """
     system = ordinary(observation, settings, options)
     raw, fit = system.raw, system.solve()
@@ -64,7 +64,9 @@ def weighted_system(
     weights: Weights = "none",
     columns: tuple[str, ...] | Literal["all"] = "all",
 ) -> System:
-    """Weight the rows of the given columns for least squares that no setting chooses."""
+    """Weight the rows of the given columns for least squares, with weights that no setting of the
+    user selects.
+    """
     settings = EstimateSettings(weights=weights, columns=columns)
     return by_weights(observation, settings, LinearOptions())
 
@@ -81,7 +83,8 @@ def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
 
 
 def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Raise the residual scale s_j of each joint to at least LIMIT.EXACT_FIT times the rms of Y_j.
+    """Raise the residual scale s_j of each joint to at least a small share (EXACT_FIT in
+    limits.toml) of the rms of Y_j.
 
     An exact fit of a joint would otherwise get infinite weight.
     """

@@ -13,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from runtime.core.rows.factor import Factor, JointFactor, factor, joint_factors, merged, selected
+from runtime.core.rows.factor import Factor, JointFactor, joint_factors, merged, selected
+from runtime.core.rows.streamed import StreamedMatrix, stacked_matrices
 from runtime.ground.errors import InputError
 
 Array = np.ndarray
@@ -54,7 +55,8 @@ class Observation:
     Attributes
     ----------
     W : ndarray, shape (r, b)
-        Rows joint-major: all rows of joint 1 first.
+        Rows joint-major: all rows of joint 1 first. Of long records, a `StreamedMatrix`, which is
+        read like an array and makes rows when they are asked for.
     Y : ndarray, shape (r,), N m or N
     rows : tuple of int
         Number of rows of each joint.
@@ -121,6 +123,11 @@ class Observation:
         return len(self.rows)
 
     @property
+    def streamed(self) -> bool:
+        """Whether rows of W are made when they are asked for, as of long records."""
+        return isinstance(self.W, StreamedMatrix)
+
+    @property
     def joints(self) -> Array:
         """Number of the joint of each row of W and Y, counted from 0, shape (r,)."""
         return np.repeat(np.arange(self.n), self.rows)
@@ -139,7 +146,8 @@ class Observation:
     def factor(self) -> Factor:
         """Triangular (QR) factor of [W Y], made from the factors of the joints; computed once."""
         if self.block_factors is None:
-            return factor(self.W, self.Y, self.rows, self.names)
+            (joints,) = self.joint_factors(np.zeros(len(self.Y), dtype=np.int8))
+            return Factor.of(self.names, joints)
         return Factor.of(self.names, merged(self.block_factors))
 
     @cached_property
@@ -151,14 +159,24 @@ class Observation:
         """
         if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
             return None
-        return joint_factors(self.W, self.Y, self.rows, self.blocks())
+        return self.joint_factors(self.blocks())
+
+    def joint_factors(self, groups: Array) -> list[tuple[JointFactor, ...]]:
+        """Compute the triangular factors of [W Y], joint by joint, of each group of rows.
+
+        groups : number of the group of each row, shape (r,), from 0.
+        """
+        if isinstance(self.W, StreamedMatrix):
+            return self.W.joint_factors(self.Y, groups)
+        return joint_factors(self.W, self.Y, self.rows, groups)
 
     def columns(self, names: Sequence[str]) -> Observation:
         """Return the same rows of Y = W X + rho with the named columns of W only, in this order."""
         if tuple(names) == self.names:
             return self
         kept = column_numbers(names, self.names)
-        return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
+        W = self.W[:, kept]
+        return replace(self, W=W if self.streamed else np.asfortranarray(W), names=tuple(names))
 
     def equal_parts(self, count: int) -> Array:
         """Return the number of the time interval of each row, for `count` equal ones, shape (r,).
@@ -183,10 +201,9 @@ class Observation:
             if self.closed_loop is None
             else replace(self.closed_loop, rows=self.closed_loop.rows[mask])
         )
-        W = np.compress(mask, self.W.T, axis=1).T
         return replace(
             self,
-            W=W,
+            W=self.W[mask] if self.streamed else np.compress(mask, self.W.T, axis=1).T,
             Y=self.Y[mask],
             t=self.t[mask],
             record=self.record[mask],
@@ -196,7 +213,10 @@ class Observation:
         )
 
     def between(self, t0: float | None, t1: float | None) -> Observation:
-        """Return the rows of Y = W X + rho with t0 <= t <= t1, s; None leaves an end open."""
+        """Return the rows of Y = W X + rho with t0 <= t <= t1, s; None leaves an end open.
+
+        An interval of a long record that is asked for again has the factors of before.
+        """
         first = -np.inf if t0 is None else t0
         last = np.inf if t1 is None else t1
         part = self.where((self.t >= first) & (self.t <= last))
@@ -205,7 +225,43 @@ class Observation:
                 f"no row of the observation lies in [{t0}, {t1}] s; the rows span "
                 f"[{self.span[0]:g}, {self.span[1]:g}] s"
             )
+        if self.streamed:
+            if (t0, t1) not in self._parts:
+                self._parts[t0, t1] = {"block_factors": part.block_factors, "factor": part.factor}
+            vars(part).update(self._parts[t0, t1])
         return part
+
+    def folds(self, count: int) -> Iterator[tuple[Observation, Observation]]:
+        """Yield the rows outside and inside each of `count` equal intervals of time that has rows.
+
+        The factors of a long record are those of `fold_factors`.
+        """
+        number = numbered(self.equal_parts(count))
+        for p in range(number.max(initial=-1) + 1):
+            rest, part = self.where(number != p), self.where(number == p)
+            if self.streamed:
+                factors = self.fold_factors(count)
+                others = merged([own.joints for k, own in enumerate(factors) if k != p])
+                vars(part)["factor"] = factors[p]
+                vars(rest)["factor"] = Factor.of(self.names, others)
+            yield rest, part
+
+    def fold_factors(self, count: int) -> list[Factor]:
+        """Compute the factor of [W Y] in each of `count` equal intervals of time that has rows.
+
+        Those of a long record come from one pass, and are kept.
+        """
+        number = numbered(self.equal_parts(count))
+        if not self.streamed:
+            return [self.where(number == p).factor for p in range(number.max(initial=-1) + 1)]
+        if count not in self._parts:
+            self._parts[count] = [Factor.of(self.names, own) for own in self.joint_factors(number)]
+        return cast("list[Factor]", self._parts[count])
+
+    @cached_property
+    def _parts(self) -> dict[Any, Any]:
+        """Factors of intervals of a long record that were asked for, by interval or their number."""
+        return {}
 
     def of_record(self, number: int) -> Observation:
         """Return the rows of Y = W X + rho from one record; its number is counted from 0."""
@@ -219,6 +275,12 @@ class Observation:
         """
         whole = np.zeros(len(self.names))
         whole[column_numbers(names, self.names)] = X
+        if self.streamed:
+            joints = self.factor.joints
+            return (
+                np.array([joint.residual_norm(whole) for joint in joints]),
+                np.array([joint.measured_norm for joint in joints]),
+            )
         residual = self.Y - self.W @ whole
         return (
             np.array([np.linalg.norm(residual[self.joint(j)]) for j in range(self.n)]),
@@ -238,15 +300,13 @@ class Observation:
 
         The numbers start from 0. No block extends over two records.
         """
-        _, record = np.unique(self.record, return_inverse=True)
+        record = numbered(self.record)
         first = np.full(record.max() + 1, np.inf)
         np.minimum.at(first, record, self.t)
         interval = np.floor(
             (self.t - first[record]) / (length or self.residual_block) + 1e-9
         ).astype(np.intp)
-        return np.asarray(
-            np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1]
-        )
+        return numbered(record * (interval.max() + 1) + interval)
 
     def bands(self, load: Array) -> list[Array]:
         """Return bands of rows by speed, load, position, and way since the last reversal.
@@ -256,24 +316,31 @@ class Observation:
 
         load : torque of the joint of each row, shape (r,).
         """
+        return [*self.motion_bands, self._bands(np.abs(load))] if self.motion is not None else []
+
+    @cached_property
+    def motion_bands(self) -> list[Array]:
+        """Bands of rows by speed, position, and way since the last reversal, as of `bands`."""
         if self.motion is None:
             return []
         q, qd = self.motion.T
-        return [self._bands(values) for values in (np.abs(qd), np.abs(load), q, self._ways())]
+        return [self._bands(values) for values in (np.abs(qd), q, self._ways())]
 
     def _ways(self) -> Array:
         """Compute the way of the joint of each row since its last reversal, rad or m, shape (r,)."""
         assert self.motion is not None
-        q, qd = self.motion.T
-        new = np.diff(np.sign(qd), prepend=0.0) != 0
-        new[np.diff(self.record, prepend=-1) != 0] = True
-        new[[self.joint(j).start for j in range(self.n) if self.rows[j]]] = True
-        last = np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))
-        return np.asarray(np.abs(q - q[last]))
+        ways = np.empty(len(self.Y))
+        for own in map(self.joint, range(self.n)):
+            q, qd = self.motion[own].T
+            new = np.diff(np.sign(qd), prepend=0.0) != 0
+            new[np.diff(self.record[own], prepend=-1) != 0] = True
+            last = np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))
+            ways[own] = np.abs(q - q[last])
+        return ways
 
     def _bands(self, values: Array) -> Array:
         """Number the bands of one quantity; a joint in which it is constant has one band."""
-        band = np.zeros(len(self.Y), dtype=np.intp)
+        band = np.zeros(len(self.Y), dtype=np.int8)
         for j in range(self.n):
             own = self.joint(j)
             if np.ptp(values[own]) if self.rows[j] else 0.0:
@@ -314,8 +381,36 @@ class Observation:
         whole = np.zeros(len(self.names))
         whole[column_numbers(names, self.names)] = X
         load = self.W @ whole
-        for groups in self.bands(load):
-            yield self._weighted_rows(names, weights, groups, covariance)
+        if not self.streamed or covariance is not None:
+            for groups in self.bands(load):
+                yield self._weighted_rows(names, weights, groups, covariance)
+        elif self.motion is not None:
+            for factors in (*self.motion_factors, *self.gram_factors([self._bands(np.abs(load))])):
+                yield self._weighted_factors(names, weights, factors)
+
+    @cached_property
+    def motion_factors(self) -> list[list[tuple[JointFactor, ...]]]:
+        """Factors of `motion_bands` of a long record, each band joint by joint."""
+        return self.gram_factors(self.motion_bands)
+
+    def gram_factors(self, groupings: Sequence[Array]) -> list[list[tuple[JointFactor, ...]]]:
+        """Compute factors of the groups of each grouping, by their Gram matrices, of a long record."""
+        assert isinstance(self.W, StreamedMatrix)
+        return self.W.gram_factors(self.Y, groupings, self.factor)
+
+    def _weighted_factors(
+        self, names: Sequence[str], weights: Array, groups: Sequence[Sequence[JointFactor]]
+    ) -> Iterator[Array]:
+        """Yield the weighted factors of [W Y] of each group, in place of its rows."""
+        kept = column_numbers(names, self.names)
+        for joints in groups:
+            yield np.vstack(
+                [
+                    weight * selected(joint, kept).spread(len(kept))
+                    for joint, weight in zip(joints, weights, strict=True)
+                    if joint.rows
+                ]
+            )
 
     def _weighted_rows(
         self, names: Sequence[str], weights: Array, groups: Array, covariance: Array | None
@@ -355,18 +450,15 @@ class Observation:
             Covariance of the torques of one instant, by which rows are whitened in place of the
             weights.
         """
-        if covariance is not None or self.block_factors is None or length != self.residual_block:
+        factors = None
+        if covariance is None and length == self.residual_block:
+            factors = self.block_factors
+        if factors is None and covariance is None and self.streamed:
+            (factors,) = self.gram_factors([self.blocks(length)])
+        if factors is None:
             yield from self._weighted_rows(names, weights, self.blocks(length), covariance)
         else:
-            kept = column_numbers(names, self.names)
-            for joints in self.block_factors:
-                yield np.vstack(
-                    [
-                        weight * selected(joint, kept).spread(len(kept))
-                        for joint, weight in zip(joints, weights, strict=True)
-                        if joint.rows
-                    ]
-                )
+            yield from self._weighted_factors(names, weights, factors)
 
 
 def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
@@ -384,6 +476,12 @@ def rows_by_block(blocks: Array) -> list[Array]:
     """
     order = np.argsort(blocks, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
+
+
+def numbered(groups: Array) -> Array:
+    """Number the groups that occur from 0, in their order; integers from 0, shape (r,)."""
+    number = np.cumsum(np.bincount(groups) > 0) - 1
+    return np.asarray(number[groups])
 
 
 def halves(t0: float, t1: float) -> tuple[Window, Window]:
@@ -405,8 +503,11 @@ def stack(observations: Sequence[Observation]) -> Observation:
     n = observations[0].n
     rows = [(o, o.joint(j)) for j in range(n) for o in _numbered(observations)]
     known = all(o.motion is not None for o in observations)
+    matrices: list[Any] = [o.W for o in observations]
     return Observation(
-        W=np.asfortranarray(_joined("W", rows)),
+        W=cast("Array", stacked_matrices(matrices))
+        if all(o.streamed for o in observations)
+        else np.asfortranarray(_joined("W", rows)),
         Y=_joined("Y", rows),
         rows=tuple(sum(o.rows[j] for o in observations) for j in range(n)),
         names=observations[0].names,

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from runtime.core.record import JOINT_CHANNELS, Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.core.rows.streamed import WHOLE, Source, StreamedMatrix
 from runtime.core.signals.base import base_motion
 from runtime.core.signals.decimation import decimate
 from runtime.core.signals.filters import States, median_filtered
@@ -38,6 +39,8 @@ Array = np.ndarray
 
 COPIES = 2
 """Copies of W while rows are made and factored; 1.8 were measured without decimation."""
+ROW = 150
+"""Bytes of a row of a long record, whose W is not kept: Y, t, record and motion, and their sorting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,7 @@ class Prepared:
     def channels(self) -> dict[str, Array]:
         """Recorded signals with one column, such as a temperature, by name, shape (N,) each.
 
-        The motion of a base that moves is among them, filtered.
+        The filtered motion of a base that moves is included.
         """
         given = self.record.channels
         own = {c: x[:, 0] for c, x in given.items() if c not in JOINT_CHANNELS and x.shape[1] == 1}
@@ -87,7 +90,7 @@ class Prepared:
 
     @cached_property
     def selection(self) -> Selection:
-        """Used rows of the record: those selected, or chosen by time, decimation and speed."""
+        """Used rows of the record: the given selection, or a choice by time, decimation and speed."""
         if self.selected is not None:
             return self.selected
         return select_rows(self.record, self.states.qd, self.study.signals, self.study.rows)
@@ -98,16 +101,24 @@ class Prepared:
         return decimated_torque(self.record.torque, self.selection)
 
     def certain(self, model: GeneratedModel) -> Selection:
-        """Return the used rows, without those of unknown state or uncertain friction direction."""
+        """Return the used rows, without rows of unknown state or uncertain friction direction."""
         return certain(model, self.states, self.selection)
 
     def observation(
-        self, model: GeneratedModel, columns: Sequence[str] | None = None
+        self, model: GeneratedModel, columns: Sequence[str] | None = None, *, whole: bool = True
     ) -> Observation:
-        """Build the system Y = W X + rho of the selected rows."""
-        wanted = Columns(model, columns)
-        files = self.record.files
-        return observation_of(wanted, self.states, self.torque, self.selection, files=files)
+        """Build the system Y = W X + rho of the selected rows.
+
+        whole : whether W is made now, or piece by piece when its rows are asked for.
+        """
+        return observation_of(
+            Columns(model, columns),
+            self.states,
+            self.torque,
+            self.selection,
+            files=self.record.files,
+            whole=whole,
+        )
 
     def by(self, study: Study) -> Prepared:
         """Return the same record prepared with the settings of another study.
@@ -135,7 +146,7 @@ class Prepared:
 
 
 def study_of_record(study: Study, record: Record) -> Study:
-    """Return the study with the cut-off of the record, if the record has one of its own."""
+    """Return the study with the cut-off of the record, if the record has a cut-off of its own."""
     low, own = study.signals.lowpass, record.origin.cutoff
     if low is None or own is None:
         return study
@@ -145,7 +156,7 @@ def study_of_record(study: Study, record: Record) -> Study:
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
     """Return the drives that all records have, or the drives of the model if there is no record.
 
-    InputError if the records were read with different couplings.
+    Raise InputError if the records were read with different couplings.
     """
     coupled = {own.drives.coupling for own in records if own.drives is not None}
     if len(coupled) > 1:
@@ -172,12 +183,13 @@ def observation_of(
     selection: Selection,
     *,
     files: Mapping[str, str] | None = None,
+    whole: bool = True,
 ) -> Observation:
     """Build the system Y = W X + rho of one record; `columns` computes the observation matrix W.
 
     If errors of the velocities are known, two more kinds of rows are left out: rows in which
     missing positions leave the state unknown ("missing"), and rows in which the direction of dry
-    friction is uncertain ("direction").
+    friction is uncertain ("direction"). whole : as for `Prepared.observation`.
     """
     model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
@@ -188,17 +200,23 @@ def observation_of(
             f"expected {(n, K)} and {n} joints"
         )
     window = states[selection.samples]
-    used = np.flatnonzero(selection.mask.any(axis=0))
-    inside = slice(used[0], used[-1] + 1)
-    store = columns.decimated(window, selection.plan, inside)
+    instants = np.flatnonzero(selection.mask.any(axis=0))
+    inside = slice(instants[0], instants[-1] + 1)
+    made = (columns.decimated if whole else columns.read)(window, selection.plan, inside)
     selection = certain(model, states, selection)
     if not selection.mask.any():
         left_out = nothing_left(selection.dropped, K)
         raise InputError(left_out, file=", ".join(files or ()) or None)
-    mask = selection.mask[:, inside].ravel()
-    rows = store.reshape(len(columns.names), len(mask))
+    used = selection.mask[:, inside]
+    mask = used.ravel()
+    if isinstance(made, np.ndarray):
+        rows = made.reshape(len(columns.names), len(mask))
+        W = (rows if mask.all() else np.compress(mask, rows, axis=1)).T
+    else:
+        source = Source(columns.entries, made, used)
+        W = cast("Array", StreamedMatrix((source,), np.arange(len(columns.names))))
     return Observation(
-        W=(rows if mask.all() else np.compress(mask, rows, axis=1)).T,
+        W=W,
         Y=torque[:, inside].ravel()[mask],
         rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
         names=columns.names,
@@ -222,8 +240,8 @@ def certain(
 ) -> Selection:
     """Remove rows of unknown state, or of uncertain friction direction, from a selection of rows.
 
-    Missing positions make a state unknown ("missing"); a direction is uncertain ("direction") near
-    zero speed. Without known errors of the velocities, the selection does not change.
+    A row removed because of missing positions is counted as "missing"; a row near zero speed, as
+    "direction". Without known errors of the velocities, the selection does not change.
     """
     if states.errors is None:
         return selection
@@ -243,19 +261,22 @@ def stacked(
 
     columns : names of the columns; default: all.
 
-    InputError if there is no record, or if W is larger than the memory.
+    W of long records, of more than WHOLE bytes, is made piece by piece when its rows are asked for.
+
+    Raise InputError if there is no record, or if the rows are larger than the memory.
     """
     if not records:
         raise InputError("no record is given; expected at least one")
     b = len(model.BASE_PARAMETERS if columns is None else columns)
     rows = sum(int(record.selection.mask.sum()) for record in records)
+    whole = 8.0 * rows * b <= WHOLE
     require_memory(
-        8.0 * COPIES * rows * b,
+        8.0 * COPIES * rows * b if whole else float(ROW * rows),
         f"{rows:,} rows of {b} columns",
         "decimate (signals.decimate), use a piece of the record (rows.window), or a robot of fewer "
         "columns (symgen convert --lock)",
     )
-    return stack([record.observation(model, columns) for record in records])
+    return stack([record.observation(model, columns, whole=whole) for record in records])
 
 
 def with_torques(

@@ -1,46 +1,30 @@
 """Decimated columns of W: entries that are always zero are skipped, equal ones computed once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
-linear. Therefore only the distinct signals are filtered and then copied to their entries of W. They
-are evaluated in pieces of samples, by the operations of the module that they need
-(`runtime.core.rows.tape`), and decimated piece by piece: the signals are not stored.
+linear. Therefore only the distinct signals are filtered and then copied to their entries of W. The
+distinct signals are evaluated in pieces of samples, by the operations of the module that they need
+(`runtime.core.rows.tape`), and decimated piece by piece, so that they are never stored whole.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from runtime.core.model import GeneratedModel, channels_of
 from runtime.core.rows.observation import column_numbers
+from runtime.core.rows.streamed import Entries
 from runtime.core.rows.tape import Tape, recorded
-from runtime.core.signals.decimation import PIECE, Plan, decimated_parts
+from runtime.core.signals.decimation import PART, PIECE, Plan, copy_overlap, decimated_parts
 from runtime.core.signals.filters import States
 from runtime.ground.errors import InputError
 
 Array = np.ndarray
 
 PROBES = 64  # random states that tell signals apart
-
-
-@dataclass(frozen=True, eq=False)
-class Entries:
-    """Table of the nonzero entries of the regressor, which marks entries that are equal up to sign.
-
-    Wanted store[row[m], j[m]] = sign[m] * signal[which[m]].
-
-    place : row of each signal in the store, shape (b n, N).
-    """
-
-    row: Array
-    j: Array
-    which: Array
-    sign: Array
-    place: Array
 
 
 class Columns:
@@ -96,16 +80,37 @@ class Columns:
                 )
         return store
 
-    def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
+    def read(
+        self, states: States, plan: Plan | None, instants: slice
+    ) -> Callable[[int, int], Array]:
+        """Return a function that gives the distinct entries of W at the instants [a, b).
+
+        The parameters are those of `decimated`; the instants count from the first of `instants`.
+        Decimated entries are kept, those of every sample are computed when they are asked for.
+        """
+        first, last, _ = instants.indices(len(states) if plan is None else plan.K)
+        if plan is None:
+            return partial(self._between, states[first:last])
+        kept = np.empty((len(self.entries.place), last - first))
+        for part, signals in self.signals(states, plan, PIECE):
+            copy_overlap(signals, part.start, kept, first)
+        return lambda a, b: kept[:, a:b]
+
+    def _between(self, states: States, a: int, b: int) -> Array:
+        return self._evaluated(states[a:b])
+
+    def signals(
+        self, states: States, plan: Plan | None, most: int = PART
+    ) -> Iterator[tuple[slice, Array]]:
         """Yield the distinct entries of W, decimated, one slice of the kept samples at a time.
 
-        Their shape is (S, instants). Arrays are valid until the next ones are requested.
+        The shape is (S, instants). An array is valid until the next array is requested.
 
-        plan : plan of the decimation; None keeps every sample.
+        plan : plan of the decimation; None keeps every sample. most : kept samples of a slice.
         """
         if plan is not None:
             yield from decimated_parts(
-                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.place), plan
+                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.place), plan, most
             )
             return
         for t0 in range(0, len(states), PIECE):
@@ -141,7 +146,7 @@ class Columns:
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
     """Return the recorded signals that the model needs, such as a temperature, by name, shape (N,).
 
-    InputError if the states lack one of them.
+    Raise InputError if the states lack one of these signals.
     """
     channels = channels_of(model)
     if missing := [c for c in channels if c not in states.channels]:
@@ -179,9 +184,9 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """Evaluate the regressor at PROBES random states, shape (b, n, PROBES).
+    """Evaluate the regressor at m random states, shape (b, n, m).
 
-    nan if a loop does not close at one of them.
+    The result is nan if a loop does not close at one of the states.
     """
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))

@@ -1,6 +1,6 @@
 """Choice of the rows of Y = W X + rho that are used, by time, decimation, speed and known state.
 
-The choice is made once, on the measured record, and shared by every run of a study, so that noise
+The choice is made once, on the measured record, and every run of a study uses it, so that noise
 never decides whether a row is used.
 """
 
@@ -49,7 +49,7 @@ Chosen on simulated records (docs/theory/counts.md).
 class Selection:
     """Time window of a record, and the decimated rows in it that are used.
 
-    It is the same in every run of a study.
+    The selection is the same in every run of a study.
 
     samples : the window, in raw samples.
     kept : shape (K,), kept instants, from the start of the window.
@@ -84,7 +84,7 @@ def window_of(
 ) -> tuple[int, int]:
     """Find the samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
 
-    margin : samples left out at each end of the record, a tenth of it at most.
+    margin : samples left out at each end of the record, at most a tenth of the record.
     """
     t0, t1 = window
     start = 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
@@ -106,7 +106,7 @@ EXCERPT = 2**16
 def excerpt(record: Record, rows: Rows) -> slice:
     """Return the slice of the first samples in the time window, from which "auto" settings follow.
 
-    It has EXCERPT samples at most.
+    The length of the slice is limited (`EXCERPT`).
     """
     start, stop = window_of(record.t, rows.window, record.name)
     return slice(start, min(stop, start + EXCERPT))
@@ -116,11 +116,12 @@ def instants_of(record: Record, signals: Signals, rows: Rows) -> tuple[slice, in
     """Choose the time window of a record, and the samples in it that decimation keeps.
 
     Returns the raw samples of the window, the factor of the decimation, the samples of the window
-    that it keeps, shape (K,), and the number of these whose rows are left out at each end.
+    that it keeps, shape (K,), and the number of kept samples whose rows are left out at each end.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
-    spreads this error over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim:
-    auto leaves out END_PERIODS/cutoff before the decimation, and TRIM instants after it.
+    spreads this error over 27 instants (benchmarks/truth.md, Ends of records). Hence rows.trim:
+    auto leaves out some periods of the cutoff before the decimation, and some instants after it
+    (END_PERIODS and TRIM in limits.toml).
     """
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
@@ -251,8 +252,8 @@ def certain_rows(
 ) -> Array:
     """Find the rows with known state and known direction of dry friction, bool, shape (n, K).
 
-    A row of joint j is uncertain if |s| is below UNCERTAIN standard deviations of s; s = G qd is
-    the speed of a column that switches and acts on j.
+    A row of joint j is uncertain if |s| is below half a standard deviation of s (`UNCERTAIN`); s =
+    G qd is the speed of a column that switches and acts on j.
 
     states : shape (K, n), with known errors.
     """

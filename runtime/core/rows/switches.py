@@ -1,6 +1,6 @@
 """Friction columns of W that switch with the direction of motion.
 
-They are dry friction, and viscous friction of one direction:
+The columns are dry friction, and viscous friction of one direction:
 
 f(s) = linear s + jump sign(s) + kink |s| + a constant,  s = G qd
 """
@@ -32,9 +32,9 @@ SHAPES = {
 class Switch:
     """One column of W, dry or one-sided viscous friction, that switches with the sign of a speed.
 
-    It acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
+    The column acts on joint j as G_j f(s), f(s) = linear s + jump sign(s) + kink |s| + constant.
 
-    column : its number.   G : ndarray, shape (n,).
+    column : number of the column in W. G : ndarray, shape (n,).
     """
 
     column: int
@@ -56,7 +56,7 @@ def switches(
 ) -> tuple[Switch, ...]:
     """Find the columns among `names` that switch with the sign of a velocity, such as dry friction.
 
-    ModelError if the model describes no elements.
+    Raise ModelError if the model describes no elements.
 
     passive : whether such a column along a passive joint is refused or left out.
     """

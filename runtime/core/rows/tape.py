@@ -3,11 +3,11 @@
     tape = recorded(model, [(k, j), ...])       # entries of D, column k, joint j
     tape.evaluate(q, qd, qdd, out)              # out, shape (S, B)
 
-An emitted module writes D by operations on whole rows. They are recorded once, by calling the
-module with rows that remember what is done to them. An operation that no wanted entry needs is left
+An emitted module writes D by operations on whole rows. The operations are recorded once, by calling
+the module with rows that remember every operation. An operation that no wanted entry needs is left
 out, and a row is overwritten once no later operation uses it, so that all rows stay in the cache.
-The remaining operations are repeated in the order of the module: the results agree with its own in
-every bit.
+The remaining operations are repeated in the order of the module: the results agree with those of
+the module in every bit.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Tape:
         """Allocate arrays of B samples for the states and for the results of all operations.
 
         Returns the rows of the states, the operations with their rows, and the rows of the entries.
-        A row that no later operation uses is used again.
+        A row that no later operation needs is overwritten.
         """
         states = np.empty((len(STATES), self.n, B))
         rows: dict[int, Array] = {}
@@ -142,8 +142,8 @@ def _operations(values: Sequence[Any]) -> list[Row]:
 def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
     """Record the operations by which an emitted module computes given entries of its regressor D.
 
-    Returns None if the module does anything else than operations on rows, or depends on measured
-    functions of time.
+    Returns None if the module does more than operations on rows, or depends on measured functions
+    of time.
     """
     block = getattr(model, "_regressor_block", None)
     n = len(model.JOINTS)

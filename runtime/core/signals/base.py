@@ -1,7 +1,7 @@
-"""Motion of a base that moves: w0, wd0 and a0 from the signals that a record has of it.
+"""Motion of a base that moves: w0, wd0 and a0 from the signals of a record.
 
     w0, wd0     angular velocity (rad/s) and acceleration (rad/s**2) of frame 0
-    a0          acceleration of its origin minus gravity (m/s**2): an ideal accelerometer there
+    a0          acceleration of its origin minus gravity (m/s**2), as an ideal accelerometer reads
 
 all in the axes of frame 0. A record has either these nine signals, or the pose of frame 0 in the
 world, position p and unit quaternion Q = (w, x, y, z), with R the rotation matrix of Q:
@@ -13,9 +13,10 @@ reads f, the acceleration there minus gravity:
 
     wd0 = dw0/dt,   a0 = f - wd0 x r - w0 x (w0 x r)
 
-Constant biases of both, which no filter changes, are subtracted (`runtime.biases`).
-The filters are those of the joints: p and Q pass them like positions, the others like velocities.
-The filtered Q = r u has a length r near 1, which vec(Q* Qd)/r**2 = vec(u* ud) takes out.
+Constant biases of gyroscope and accelerometer, which no filter changes, are subtracted
+(`runtime.biases`). The filters are those of the joints: p and Q are filtered like positions, the
+other signals like velocities. The filtered Q = r u has a length r near 1; the division by r**2 in
+vec(Q* Qd)/r**2 = vec(u* ud) removes it.
 """
 
 from __future__ import annotations

@@ -1,23 +1,23 @@
 """Automatic choice of the low-pass cut-off frequency (`signals.lowpass.cutoff: auto`).
 
-Of every joint, with S the spectrum of the acceleration and N that of the noise of the positions as
-seen in it, G the gain of the low-pass on the acceleration,
+For every joint, let S be the spectrum of the acceleration, N the spectrum that the noise of the
+positions has in the acceleration, and G the gain of the low-pass on the acceleration. Then
 
     bias(fc) = sum_f [G (1 - G) S + G^2 N] / sum_f S
 
 is the relative error that least squares makes on the acceleration: the part that the low-pass
 removes from the columns but not from the torques, and the power of noise in the columns. fc
-minimises the bias of the worst joint. One pass forward and backward has the gain
-1/(1 + (w/wc)^(2 order)), with w = tan(pi f/rate); the acceleration passes one such filter for each
-entry of `lowpass.on`. Friction switches when a joint reverses, and a low cut-off distorts this
-switch. Therefore the highest cut-off is chosen at which noise alone makes less than LIMIT.QUIET of
-the least bias, at most that of the chapter.
+minimises the bias of the worst joint. One pass forward and backward has the gain 1/(1 + (w/wc)^(2
+order)), with w = tan(pi f/rate); the acceleration passes one such filter for each entry of
+`lowpass.on`. Friction switches when a joint reverses, and a low cut-off distorts this switch.
+Therefore the highest cut-off is chosen at which noise alone makes less than a given share (QUIET in
+limits.toml) of the least bias; it is at most the cut-off of the chapter.
 
-N is flat in the positions: the median of the spectrum in the upper band, and at least that of the
-steps that the positions show, step^2/12 over the band. The spectrum is that of second differences,
-so that little leaks from the motion to the noise; it counts as motion where its running mean is
-above LIMIT.MOTION times the noise. Positions read as counts have less noise: twice that cut-off.
-Measured: benchmarks/counts.md.
+N is flat in the positions: the median of the spectrum in the upper band, but at least the noise
+step^2/12 of the steps that the positions show. The spectrum is that of second differences, so that
+little leaks from the motion to the noise; it counts as motion where its running mean clearly
+exceeds the noise (MOTION in limits.toml). Positions read as counts have less noise, so that their
+cut-off is twice as high. Measured: benchmarks/counts.md.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Array = np.ndarray
 class Lines(NamedTuple):
     """Power spectra of the acceleration of one record.
 
-    samples : number. rate : Hz.
+    samples : number of samples. rate : Hz.
     power : frequencies, shape (m,), Hz, power of the motion and of the noise, shape (m, n) each;
         None for a record that is too short, or that lacks positions.
     """
@@ -49,7 +49,7 @@ class Lines(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """Cut-off, Hz; its reason in words; whether the records decide it."""
+    """Cut-off in Hz, the reason for it in words, and whether the records decide it."""
 
     hertz: float
     why: str
@@ -123,8 +123,8 @@ def chosen_cutoff(lines: Sequence[Lines], signals: Signals, counts: bool = False
 def stands(q: Array, rate: float, median: int = 1) -> Array:
     """Find the joints that rest during the whole record, bool, shape (n,).
 
-    A joint rests if its range is below LIMIT.STILL, or if its standard deviation is below
-    LIMIT.STILL_NOISE times that of its white noise.
+    A joint rests if its range is tiny (below STILL in limits.toml), or if its standard deviation
+    hardly exceeds that of its white noise (STILL_NOISE in limits.toml).
     """
     noise = np.sqrt(white_noise(q, rate, median))
     return np.asarray(
@@ -162,7 +162,7 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
     Returns the frequencies, Hz, shape (m,), the power of the motion and the power of the noise,
     shape (m, n) each.
 
-    median : window of the median filter that finds spikes, 1 for none.
+    median : window of the median filter that finds spikes; 1 switches the filter off.
     """
     f, power, gain, level = _spectrum(q, rate, median)
     noise = gain * level

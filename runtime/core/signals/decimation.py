@@ -9,18 +9,19 @@ modal form, lambda_i the poles of positive imaginary part and c_i their residues
     backward   w_(r-1) = lambda w_r + f_r,            y_r = D f_r + 2 Re c'w_r
                (' transposes, products componentwise)
 
-with e the padded signal; both start in the steady state of their first value. Cut into blocks u_b
-of L = G n_d samples from the first kept sample phi on, with x_b the forward state at the first
-sample of block b and v_b the backward state w at its last one, everything is linear in blocks:
+with e the padded signal; both passes start in the steady state of their first value. Cut into
+blocks u_b of L = G n_d samples from the first kept sample phi on, with x_b the forward state at the
+first sample of block b and v_b the backward state w at its last one, everything is linear in
+blocks:
 
     x_(b+1) = lambda^L x_b + P u_b          v_(b-1) = lambda^L v_b + Q u_b + Mx x_b
                                             y_b = Y u_b + Yx x_b + Yv v_b
 
 [P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and
-v are K/G short steps. The start, and the samples behind the last whole block with their reflection,
-are products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. Of a long
-record, PART kept samples are computed at a time, from the samples that decide them: the effect of
-all other samples on them is below TRUNCATION.
+v are K/G short steps. The start, and the samples after the last whole block with their reflection,
+have matrix products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. A
+long record is computed in parts (`PART` kept samples), each from the samples that determine it: the
+effect of all other samples is negligible (below `TRUNCATION`).
 
 |lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows. The residues are computed from
 zeros and poles, because polynomial coefficients would lose all digits at n_d = 100.
@@ -78,7 +79,9 @@ class Operator:
 
     @property
     def reach(self) -> int:
-        """Number of samples until the slowest mode of the filter decays to the share TRUNCATION."""
+        """Number of samples until the slowest mode of the filter has decayed to nothing
+        (`TRUNCATION`).
+        """
         return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
 
 
@@ -96,7 +99,7 @@ def operator(factor: int) -> Operator:
 class Plan:
     """Matrices that decimate N samples to K kept samples; they do not depend on the signals.
 
-    Complex numbers are pairs Re, Im, 2 m of them.
+    The m complex numbers of a state are stored as 2 m real numbers, in pairs Re, Im.
 
     factor, phase, pad : n_d, phi, p.
     L, G, blocks : samples of a block, its kept samples, number of blocks.
@@ -126,7 +129,7 @@ class Plan:
     Ax: Array
 
     def pieces(self) -> list[tuple[int, int]]:
-        """Divide the N samples into pieces [t0, t1) of about PIECE samples.
+        """Divide the N samples into pieces [t0, t1) of about equal length.
 
         The pieces are made of whole blocks, except the first and the last piece.
         """

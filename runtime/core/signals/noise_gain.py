@@ -64,7 +64,7 @@ class Bandwidth:
 def bandwidth(signals: Signals, rate: float) -> Bandwidth:
     """Compute how the filters in the settings `signals` change white position noise.
 
-    rate : sampling rate, Hz. SettingsError for a median filter, which is not linear.
+    rate : sampling rate, Hz. Raise SettingsError for a median filter, which is not linear.
     """
     if signals.median != 1:
         raise SettingsError(
@@ -102,7 +102,7 @@ def _power(sos: Array, w: Array) -> Array:
 def _covariance(K: Array) -> Array:
     """Compute the covariance, shape (3, 3), of three signals from their frequency responses K.
 
-    It is the mean of K K^* over all frequencies from -pi to pi rad per sample.
+    The covariance is the mean of K K^* over all frequencies from -pi to pi rad per sample.
     """
     ends = K[:, [0, -1]]
     return np.asarray(((K @ K.conj().T).real - (ends @ ends.conj().T).real / 2) / (K.shape[1] - 1))

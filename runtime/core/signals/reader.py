@@ -3,8 +3,9 @@
     states = reader.states(record, signals)
     again  = reader.at_step(step, side).states(rounded_record, signals)
 
-A reader says of itself all that other modules ask of it, so that no module knows a reader by its
-name. The names are in the list READERS of `runtime/compose.py`; signals.reader is one of them.
+The attributes of a reader state everything that other modules need to know, so that no module
+compares names of readers. The names are in the list READERS of `runtime/compose.py`; signals.reader
+is one of them.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ class Reader:
     options : type or None
         Settings class of signals.options; None: the reader has no options.
     settings : type
-        Class of its section `signals`: that of the chapter, or a subclass with settings of its own.
+        Class of the section `signals` for this reader: the class of the chapter, or a subclass with
+        settings of its own.
     linear : bool
         Whether each position is used as it is, and the states are linear in the positions of the
         same joint: a joint that stands is read as standing, and rounded positions are read like
@@ -57,9 +59,9 @@ class Reader:
     missing : bool
         Whether records may lack positions at some samples.
     rounded : function of Record, Signals, step and side to States, or None
-        States of a record whose positions were rounded to steps of `step`, rad or m, of encoders
-        on `side`, motor or joint, of the gears; step 0: the positions are exact. None: a linear
-        reader reads them like any other; for a nonlinear reader, coarser encoders cannot be
+        States of a record whose positions were rounded to steps of `step`, rad or m, of encoders on
+        `side`, motor or joint, of the gears; step 0: the positions are exact. None: a linear reader
+        reads rounded positions like any others; for a nonlinear reader, coarser encoders cannot be
         studied.
     encoder : function of Signals to (step, side), or None
         Step (None: from the record) and side of the encoders by the settings, of a reader that
@@ -87,13 +89,15 @@ class Reader:
 
     @property
     def own_settings(self) -> dict[str, Any]:
-        """Keys of its section `signals` that the chapter does not have, with their defaults."""
+        """Keys of the section `signals` of this reader that the chapter does not have, with their
+        defaults.
+        """
         known = {f.name for f in fields(Signals)}
         return {f.name: f.default for f in fields(self.settings) if f.name not in known}
 
     @property
     def filters_positions(self) -> bool:
-        """Whether errors of positions reach the states by the filters of the signals alone."""
+        """Whether the filters alone decide how errors of positions change the states."""
         return self.linear and not self.at_rest
 
     @property
@@ -123,7 +127,7 @@ class Reader:
         Raises
         ------
         SettingsError
-            Options that do not suit.
+            An option does not suit the reader.
         """
         signals, rows = study.signals, study.rows
         changed: dict[str, Any] = {
