@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -140,11 +139,6 @@ def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Cur
     return found
 
 
-def least_peak() -> float:
-    """Largest resident set of this process, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
-
-
 def by_joints(folder: Path, joints: tuple[int, ...]) -> dict[str, dict[str, Curves]]:
     """Seconds and MB of commands and of the stages of `generate`, {size: {shape: points}}."""
     commands: dict[str, Curves] = {name: {} for name in SIZES}
@@ -156,14 +150,16 @@ def by_joints(folder: Path, joints: tuple[int, ...]) -> dict[str, dict[str, Curv
             out.mkdir()
             (out / "robot.yaml").write_bytes(written(n))
             show, _ = process(out, "-m", "symgen", "show", "robot.yaml")
-            seconds, peak = process(out, stager, "robot.yaml", "-o", ".")
+            seconds, _ = process(out, stager, "robot.yaml", "-o", ".")
+            spent = json.loads((out / "stages.json").read_text())
+            peak = max(x for _, x in spent.values())  # each stage sets that of the process back
             size = (out / f"{shape}{n}.py").stat().st_size / 1e3
             imported, _ = process(out, "-B", "-c", f"import {shape}{n}")
             sizes = show, seconds, peak, size, imported
             for name, x in zip(SIZES, sizes, strict=True):
                 commands[name].setdefault(shape, []).append((n, x))
-            for stage, spent in json.loads((out / "stages.json").read_text()).items():
-                for unit, x in zip(("s", "MB"), spent, strict=True):
+            for stage, used in spent.items():
+                for unit, x in zip(("s", "MB"), used, strict=True):
                     stages.setdefault(f"{stage}, {unit}", {}).setdefault(shape, []).append((n, x))
             print(shape, n, *(f"{x:.3g}" for x in sizes), flush=True)
     return {"commands": commands, "stages": stages}
@@ -187,7 +183,7 @@ def table_of_trees(found: dict[str, dict[str, Curves]], load: str) -> str:
         "# Growth with the joints",
         "",
         "Written by `python benchmarks/growth.py --trees`, which says what is measured; the trees are those of `trees.py`, the stages those of `stages.py`.",
-        f"One run of each, two virtual cores, load average {load}; a process shows at least the {least_peak():.0f} MB of the one that starts it.",
+        f"One run of each, two virtual cores, load average {load}.",
         "Exponents are those of the two largest trees; the start of Python, some 0.3 s, is in all seconds of commands.",
         "",
     ]

@@ -12,7 +12,8 @@ Before timing, every entry of pinocchio's D, 10 columns a link, is compared with
 d base parameters / d standard parameters: at most 1e-9 of the largest entry.
 
 pinocchio's D has the inertial columns of all links; that of symgen the base columns of the links, and
-friction. Seconds are those of the processor, of every process that takes part.
+friction. Seconds are those of the processor; a process shows at least the memory of the one that
+starts it.
 """
 
 from __future__ import annotations
@@ -174,7 +175,7 @@ def measure(name: str, program: Path, folder: Path) -> list[str]:
         strict=True,
     )
     cells = " | ".join(f"{a / b:.2f}" for a, b in ratios)
-    return [*rows, f"| {name} | ratio (entries agree to {error:.0e}) | {cells} |"]
+    return [*rows, f"| {name} | theirs / ours (entries agree to {error:.0e}) | {cells} |"]
 
 
 def _inertial(robot: Robot) -> list[tuple[str, int]]:
