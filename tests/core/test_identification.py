@@ -95,10 +95,10 @@ def test_work_is_done_once(model, monkeypatch):
         "torque_constant": [1.0, 1.0],
     }
     coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
-    keep = {"filtered_states": filtered, "factor": factored}
+    keep = {"filtered_states": filtered, "joint_factors": factored}
     for place in (
         "runtime.core.signals.reader.filtered_states",
-        "runtime.core.rows.observation.factor",
+        "runtime.core.rows.observation.joint_factors",
     ):
         calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
         monkeypatch.setattr(

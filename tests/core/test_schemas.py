@@ -116,9 +116,9 @@ def test_editors_know_the_lists(wrong):
 def test_editors_show_what_a_key_holds():
     definitions = json_schema("study")["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
-        "Cutoff frequency; auto: from the motion and the noise of each record "
-        "(`runtime.core.signals.cutoff`), twice that for counts, at most 50, as in the chapter, and 50 "
-        "if there is no record. [Hz]"
+        "Cut-off frequency. auto: symgen derives it from the motion and the noise of each record "
+        "(`runtime.core.signals.cutoff`), doubles it for counts, and limits it to 50 Hz, the value of "
+        "the chapter, which is also used if there is no record. [Hz]"
     )
     for name, definition in definitions.items():
         assert [

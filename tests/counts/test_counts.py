@@ -495,7 +495,9 @@ def test_motor_counts_are_counts_whatever_the_coupling(coupling, tmp_path):
 
 
 def test_settings_of_counts_need_the_reader(planar, record):
-    with pytest.raises(SettingsError, match=r"signals\.step: given.*reader: counts"):
+    with pytest.raises(
+        SettingsError, match=r"signals\.step: .*does not use this key.*reader: counts"
+    ):
         problem(planar, record, Study(signals=Signals(step=0.01)))
 
 

@@ -188,7 +188,9 @@ def test_a_place_that_is_not_there_is_named(tmp_path):
     study = study_from_mapping({"payload": {"at": "tcp"}})
     x, y = (table(URDF, loaded, 1, 0.0) for loaded in (False, True))
     records = [runtime.Record(r[:, 0], r[:, 1:4], r[:, 4:], rate=RATE) for r in (x, y)]
-    with pytest.raises(SettingsError, match=r"payload\.at: 'tcp' is no link .* c, flange, camera"):
+    with pytest.raises(
+        SettingsError, match=r"payload\.at: 'tcp' is no named place .* c, flange, camera"
+    ):
         payload(module, records[0], study, loaded=records[1])
 
 
