@@ -100,7 +100,7 @@ def measured(way: Way, folder: Path) -> None:
 def lecture(way: Way, _: Path) -> None:
     """A packaged robot, to one typeset model as LaTeX and the certificate as a page."""
     way.option("#packaged", "planar_2r")
-    way.click("form[hx-post='do/packaged'] button")
+    way.click("form:has(#packaged) button")
     way.wait("document.querySelectorAll('.formulas li').length > 0")
     way.option("form[hx-get='view/model'] [name=model]", "inertia_matrix")
     way.click("form[hx-get='view/model'] button")
