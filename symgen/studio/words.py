@@ -9,7 +9,7 @@ import re
 
 PLACES = {
     "; identify --suggest FILE writes a likely study": "",
-    "identify says why": "Solve says why",
+    "`symgen identify` gives the reason": "Solve gives the reason",
     "symgen report, or symgen identify --physical": "physical consistency on Solve",
     "ask with symgen report --encoder STEP, or symgen cestac --advise": "ask for it on Solve",
     "--columns ZZ1R,MX2R of symgen report and cestac, or cestac: {columns: [ZZ1R, MX2R]} of the study": "cestac.columns of the study",
@@ -20,6 +20,7 @@ PLACES = {
     "(--friction)": "(friction curves on Solve)",
     "(--method feasible)": "(feasible on Solve)",
     " with --lock": " fixed",
+    ": --verbose": ": in the report",
     "symgen identify then builds": "Solve then builds",
     " (symgen.model(ROBOT, base='moving'))": "",
     "; exact=True or --exact keeps them": "; --exact in a terminal keeps them",
