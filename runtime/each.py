@@ -22,6 +22,7 @@ from typing import Any
 from runtime.compose import entry, identify, records_of, require_study
 from runtime.core.model import GeneratedModel, require_emitted
 from runtime.core.provenance import processor, versions
+from runtime.ground.arrays import require_kind
 from runtime.ground.errors import InputError
 from runtime.reading.files import is_file, sha256_of
 from runtime.reading.records import labels, record_files
@@ -103,6 +104,7 @@ def identify_each(
     [('run0', False), ('run1', False)]
     """
     require_emitted(model)
+    require_kind(folder, (str, Path), "folder", "the name of a folder")
     place = Path(folder).absolute()
     options = {"physical": physical, "friction": friction, "plausible": plausible}
     asked = {**options, "variants": variants is not None}

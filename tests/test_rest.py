@@ -109,7 +109,7 @@ def test_what_poses_cannot_do_is_refused():
         runtime.static_poses(model, (), at_rest(model, poses=2))
     with pytest.raises(InputError, match="reader: static"):
         runtime.static_poses(model, [record])
-    with pytest.raises(SettingsError, match="reader is static"):
+    with pytest.raises(SettingsError, match="the reader static does not use this key"):
         runtime.problem(model, record, at_rest(model, signals={"reader": "static", "step": 0.1}))
 
 
