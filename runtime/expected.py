@@ -21,11 +21,11 @@ torque errors of motions within the range of the robot.
                  + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2 + ||D dX + F a||^2/||D X||^2
 
 The first term is what the record leaves undetermined. The second term is the difference between the
-fit and the joint estimate of record and values. The third term is the amount by which the encoder steps make
-inertias too small (the encoder resolution of the record: `runtime.counts.encoder_advice`). The
-fourth term is what the model lacks; the first two terms are then multiplied by the share of the squared error
-that the laws leave. Other effects that the model lacks are included only as far as they are in the
-residuals of C.
+fit and the joint estimate of record and values. The third term is the amount by which the encoder
+steps make inertias too small (the encoder resolution of the record:
+`runtime.counts.encoder_advice`). The fourth term is what the model lacks; the first two terms are
+then multiplied by the share of the squared error that the laws leave. Other effects that the model
+lacks are included only as far as they are in the residuals of C.
 
 The squared error of one record is a sum of b squares, a few of which are large: with M = K'D'D K V
 it is distributed as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The interval of the
